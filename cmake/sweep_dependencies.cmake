@@ -10,6 +10,10 @@ if(NOCDYN_SWEEP)
     message(FATAL_ERROR "NetCDF-Fortran is missing: install it (Debian: libnetcdff-dev), "
       "or build without the sweeps by -DNOCDYN_SWEEP=OFF")
   endif()
+  find_package(NLopt CONFIG)
+  if(NOT NLopt_FOUND)
+    message(FATAL_ERROR "NLopt is missing: install it (Debian: libnlopt-dev), or build without the sweeps by -DNOCDYN_SWEEP=OFF")
+  endif()
 endif()
 
 if(NOCDYN_MPI)

@@ -4,11 +4,12 @@ module nocdyn_fit_problem
   use nocdyn_comparisons, only: comparison_t
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fit_comparisons, only: compare_measurements, fix_delays, refuse_unfitted
+  use nocdyn_free_numbers, only: set_free_numbers
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_least_squares, only: residuals_t
   use nocdyn_measurements, only: measurement_t
-  use nocdyn_unknowns, only: set_unknowns, unknown_t
+  use nocdyn_unknowns, only: unknown_t
   implicit none (type, external)
   private
 
@@ -58,7 +59,7 @@ contains
     integer :: i, n
 
     r = 0.0_wp
-    call set_unknowns(self%input, self%unknowns, x, message)
+    call set_free_numbers(self%input, self%unknowns, x, message)
     if (message /= '') then
       call raise(error, exit_input, message)
       return

@@ -4,6 +4,7 @@ module nocdyn_fit_results
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fit_problem, only: fit_problem_t, new_fit_problem
   use nocdyn_fit_report, only: fit_csv, machine_fit_t, fit_text, put_fit
+  use nocdyn_free_numbers, only: set_free_numbers
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_json, only: json_t
@@ -16,7 +17,7 @@ module nocdyn_fit_results
   use nocdyn_signals, only: list_signals, signal_t
   use nocdyn_sobol_points, only: sobol_points, sobol_points_t
   use nocdyn_text, only: append, string_t
-  use nocdyn_unknowns, only: read_unknowns, set_unknowns, unknown_t
+  use nocdyn_unknowns, only: read_unknowns, unknown_t
   implicit none (type, external)
   private
 
@@ -70,7 +71,7 @@ contains
     if (allocated(error)) return
     self%fit%after = problem%comparisons
     self%fitted = input
-    call set_unknowns(self%fitted, self%fit%unknowns, self%fit%solution%x, message)
+    call set_free_numbers(self%fitted, self%fit%unknowns, self%fit%solution%x, message)
     call self%fit%conclude()
   end subroutine solve
 

@@ -65,7 +65,7 @@ contains
     kept = .false.
     kept(shown) = .true.
     kept(limited) = .true.
-    if (all(kept) .or. size(input%groups_named('record')) > 0) return
+    if (all(kept) .or. size(input%groups_named('record')) + size(input%groups_named('objective')) > 0) return
     call keep_damaged(input, response%quantities, kept)
     call keep_noted(response%machine, response%quantities, kept)
     call compare_curved(response, kept, bodies)

@@ -52,6 +52,7 @@ module nocdyn_verdicts
     procedure :: add
     procedure :: add_case       !! adds the lines of a load case
     procedure :: count_found    !! number of lines with a finding
+    procedure :: worst_ratio    !! of an element and a criterion
     procedure :: put            !! writes the member `verdict` of a report
     procedure :: write_table    !! as printed
     procedure, private :: list_worst_first
@@ -256,6 +257,23 @@ contains
       end do
     end do
   end subroutine list_worst_first
+
+  !> The largest ratio of value to limit of the lines of an element and a criterion; 0 if there is none.
+  pure real(wp) function worst_ratio(self, element, criterion)
+    class(verdict_t), intent(in) :: self
+    character(len=*), intent(in) :: element, criterion
+    integer :: i
+
+    worst_ratio = 0.0_wp
+    if (.not. allocated(self%lines)) return
+    do i = 1, size(self%lines)
+      associate (line => self%lines(i))
+        if (line%has_ratio .and. line%element == element .and. line%criterion == criterion) then
+          worst_ratio = max(worst_ratio, line%ratio)
+        end if
+      end associate
+    end do
+  end function worst_ratio
 
   !> Writes a line with the finding of all, and the table; nothing without lines. Lines that differ in the load case only are one.
   subroutine write_table(self, report)

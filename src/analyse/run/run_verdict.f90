@@ -14,7 +14,7 @@ module nocdyn_run_verdict
 
   public :: add_damage, add_end, add_peaks, add_run_limits
 
-  character(len=*), parameter :: peak_keys(*) = [character(len=7) :: 'moment', 'force', 'largest']   ! of the largest magnitude
+  character(len=*), parameter, public :: peak_keys(*) = [character(len=7) :: 'moment', 'force', 'largest']   !! of magnitudes
   character(len=*), parameter :: steady_keys(*) = [character(len=19) :: 'vibratory_moment', 'vibratory_frequency', &
     'vibratory_force', 'vibratory', 'stress', 'stress_transient', 'rule', 'rule_file', 'heat', &
     'largest_temperature']

@@ -57,15 +57,20 @@ contains
     call analyse(arguments, code)
   end subroutine analysis_command
 
-  !> Does so in a program that can write NetCDF, if `netcdf` is present.
-  subroutine analyse(arguments, code, netcdf)
+  !> Does so in a program that can write NetCDF, if `netcdf` is present, or that has an analysis of its own.
+  subroutine analyse(arguments, code, netcdf, kind)
     type(arguments_t), intent(in) :: arguments
     integer, intent(out) :: code   !! the highest exit code of all files
     class(grid_file_t), intent(in), optional :: netcdf   !! not open
-    class(analysis_t), allocatable :: kind
+    class(analysis_t), intent(in), optional :: kind      !! the analysis, before its solution; absent: that of the command
+    class(analysis_t), allocatable :: own
 
-    call new_command_analysis(arguments%command, kind)
-    call analyse_files(arguments, kind, code, netcdf)
+    if (present(kind)) then
+      call analyse_files(arguments, kind, code, netcdf)
+    else
+      call new_command_analysis(arguments%command, own)
+      call analyse_files(arguments, own, code, netcdf)
+    end if
   end subroutine analyse
 
   !> Analyses every file. Files with errors do not stop the others.

@@ -187,6 +187,17 @@ contains
       'Results are the same to the last bit for any number of threads, shards or interruptions. On several computers:' // nl // &
       'mpirun -n N nocdyn-mpi sweep FILE, with the same options except --shard.' // nl // nl // &
       'Exit code 1: interrupted, or no variant can be computed.', companion_command)
+    call add_command(commands, 'optimise', 'FILE...', '--out --set --case --variant --starts --quiet', &
+      'find the best numbers and sizes of a machine', &
+      'Finds the values of &design with which &objective is smallest or largest and every &limit is kept: of numbers' // nl // &
+      'between bounds, of numbers of a list, of the sizes of catalogues. Writes optimised.nml, the input with the best' // nl // &
+      'choice, optimise.csv and optimise.json.' // nl // nl // &
+      '  --starts NUMBER    search from so many points between the bounds; default: 4' // nl // &
+      '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
+      '                     default: &output directory, else results/<name of the file>' // nl // &
+      '  --set PATH=VALUE   override a key' // nl // &
+      case_help // nl // &
+      '  --quiet            print nothing but errors', companion_command)
     call add_command(commands, 'merge', 'DIR', '--csv --quiet', 'combine the parts of a sweep', &
       'Makes sweep.nc and summary.json of the journals that the shards of a sweep have written to DIR.' // nl // nl // &
       '  --csv              write sweep.csv too' // nl // &

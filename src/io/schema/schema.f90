@@ -11,6 +11,7 @@ module nocdyn_schema
   use nocdyn_schema_joints, only: joint_examples, joint_groups, joint_keys, joint_kinds, joint_relations
   use nocdyn_schema_measurement, only: measurement_examples, measurement_groups, measurement_keys, measurement_kinds, &
     measurement_relations
+  use nocdyn_schema_optimise, only: optimise_examples, optimise_groups, optimise_keys, optimise_kinds, optimise_relations
   use nocdyn_schema_response, only: response_examples, response_groups, response_keys, response_relations
   use nocdyn_schema_rules, only: a_body, a_document, a_flag, a_folder, a_name, a_number, a_selector, a_text, a_word, alias_t, &
     allowed_t, an_integer, any_number, any_times, anything, at_least_once, at_most_once, at_most_one, exactly_once, example_t, &
@@ -44,7 +45,7 @@ module nocdyn_schema
     group_rule_t('load_case',  in_simulation, any_times,     'load_case', &
                  'A start, a fault or a load: nocdyn run does one load case after the other.'), &
     group_rule_t('output',     in_simulation, at_most_once,  '',         'What is written, in which form, and where.'), &
-    response_groups, measurement_groups, sweep_groups, fit_groups]
+    response_groups, measurement_groups, sweep_groups, fit_groups, optimise_groups]
 
   type(key_rule_t), parameter :: frame_keys(*) = [ &
     key_rule_t('case', 'title', a_text, 1, '', "''", anything, 'title of summaries and figures, one line'), &
@@ -118,11 +119,11 @@ module nocdyn_schema
       "folder of the results; '' means results/ and the name of the input file")]
 
   type(kind_rule_t), parameter, public :: kind_rules(*) = [coupling_kinds, damper_kinds, joint_kinds, torque_kinds, &
-    measurement_kinds, sweep_kinds]
+    measurement_kinds, sweep_kinds, optimise_kinds]
 
   type(key_rule_t), parameter, public :: key_rules(*) = &
     [frame_keys, coupling_keys, damper_keys, joint_keys, torque_keys, engine_keys, response_keys, measurement_keys, sweep_keys, &
-     fit_keys]
+     fit_keys, optimise_keys]
 
   type(relation_rule_t), parameter, public :: relation_rules(*) = [ &
     relation_rule_t('run', less_than, 't_start', 't_end'), &
@@ -130,7 +131,7 @@ module nocdyn_schema
     relation_rule_t('run', requires, 'start_body free', 'start_speed'), &
     relation_rule_t('output', at_most_one, 'interval', 'points'), &
     coupling_relations, damper_relations, joint_relations, torque_relations, engine_relations, response_relations, &
-    measurement_relations, sweep_relations, fit_relations]
+    measurement_relations, sweep_relations, fit_relations, optimise_relations]
 
   type(alias_t), parameter, public :: aliases(*) = sweep_aliases
 
@@ -159,7 +160,7 @@ module nocdyn_schema
     example_t('load_case',  "name = 'misfire'  misfire = 3", .false.), &
     example_t('load_case',  "name = 'half_load'  repeats = 5000  set = 'load.work.viscous=50'", .false.), &
     coupling_examples, damper_examples, joint_examples, torque_examples, response_examples, measurement_examples, &
-    sweep_examples, fit_examples]
+    sweep_examples, fit_examples, optimise_examples]
 
   ! One value for each row of `group_rules`. The rows of `key_rules` of a group are consecutive.
   integer :: rule   ! index of the lists below

@@ -7,7 +7,7 @@
 module nocdyn_serial_work
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_code_text, only: code_text_t
-  use nocdyn_analysis_results, only: analysis_result_t, of_path
+  use nocdyn_analysis_results, only: analysis_result_t, of_path, of_verdict
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
@@ -108,11 +108,13 @@ contains
     do i = 1, size(wanted)
       if (.not. wanted(i)%is_reported()) cycle
       if (wanted(i)%command /= word) cycle
+      obstacle = ''
       if (wanted(i)%mode == of_path) then
         found = report%find(wanted(i)%path)
         if (found > 0) values(i) = report%numbers(found)
-        obstacle = ''
         if (found == 0) obstacle = word // '.json of this variant has no number ' // wanted(i)%path
+      else if (wanted(i)%mode == of_verdict) then
+        values(i) = analysis%verdict%worst_ratio(wanted(i)%quantity, wanted(i)%word)
       else
         call analysis%find_recorded(wanted(i)%quantity, wanted(i)%word, wanted(i)%number, values(i), obstacle)
         values(i) = from_si(values(i), wanted(i)%in_unit)

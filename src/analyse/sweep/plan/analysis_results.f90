@@ -6,7 +6,7 @@ module nocdyn_analysis_results
   implicit none (type, external)
   private
 
-  public :: new_mode_result, new_orbit_result, new_path_result, new_response_result
+  public :: new_mode_result, new_orbit_result, new_path_result, new_response_result, new_verdict_result
 
   integer, parameter, public :: analysis_frequency = 1       !! of the damped oscillation, as nocdyn modes has it
   integer, parameter, public :: analysis_damping_ratio = 2
@@ -25,7 +25,7 @@ module nocdyn_analysis_results
   character(len=*), parameter, public :: analysis_owners(9) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
     'response', 'response', 'mode', 'mode', 'response']   !! the key of &record that each belongs to
 
-  integer, parameter, public :: of_path = -1, of_orbit = -2   !! in place of a mode: results that a report has
+  integer, parameter, public :: of_path = -1, of_orbit = -2, of_verdict = -3   !! in place of a mode: results that a report has
 
   character(len=*), parameter, public :: of_branch = 'branch'   !! what special points belong to, in place of a signal
   character(len=*), parameter, public :: signal_words(2) = [character(len=10) :: 'peak', 'peak_value']
@@ -36,7 +36,7 @@ module nocdyn_analysis_results
   type, public :: analysis_result_t
     integer :: result = 0                           !! its number among the results of a variant
     integer :: statistic = analysis_frequency       !! analysis_...
-    integer :: mode = 0                             !! number of an oscillating mode; 0: of the response; or `of_path`, `of_orbit`
+    integer :: mode = 0                             !! number of an oscillating mode; 0: of the response; or `of_path` ...
     logical :: is_crossing = .false.                !! whether an order meets the mode
     character(len=:), allocatable :: command, path  !! of a number of a report: the command and the path in its report
     character(len=:), allocatable :: word           !! of an orbit: of `signal_words` or `branch_words`
@@ -44,6 +44,7 @@ module nocdyn_analysis_results
     type(signal_t) :: signal                        !! of the response
     character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit
     real(wp) :: order = 0.0_wp                      !! 0 stands for all orders together
+    real(wp) :: window(2) = [-huge(1.0_wp), huge(1.0_wp)]   !! speeds, or frequencies, that count for a peak [rad/s]
     character(len=:), allocatable :: label          !! e.g. 'moment_shaft_order_6_peak'
     character(len=:), allocatable :: unit           !! e.g. 'N m'
     integer :: in_unit = 0                          !! this unit as index of `units`, 0: SI
@@ -143,6 +144,23 @@ contains
       if (word == 'jump_down') self%long_name = 'where a falling value jumps, number ' // to_text(number)
     end select
   end subroutine new_orbit_result
+
+  !> The largest ratio of what an analysis says of a limit; 0 if it says nothing of it.
+  subroutine new_verdict_result(command, element, criterion, self)
+    character(len=*), intent(in) :: command              !! of the analysis
+    character(len=*), intent(in) :: element, criterion   !! of lines of a verdict
+    type(analysis_result_t), intent(out) :: self
+
+    self%mode = of_verdict
+    self%statistic = 0
+    self%command = command
+    self%path = ''
+    self%quantity = element
+    self%word = criterion
+    self%label = element // ', ' // criterion
+    self%unit = ''
+    self%long_name = self%label // ': of the limit'
+  end subroutine new_verdict_result
 
   !> Of a quantity of the forced response.
   subroutine new_response_result(quantity, column, unit, order, statistic, self)

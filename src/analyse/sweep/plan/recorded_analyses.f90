@@ -31,6 +31,7 @@ module nocdyn_recorded_analyses
 
   !> What the groups &record can name: the response of the base machine.
   type, public :: analysis_reader_t
+    character(len=:), allocatable :: kind              !! of the groups: 'record', or another one with its keys
     integer, allocatable :: wanted_units(:)
     type(response_settings_t) :: settings
     type(moment_form_t), allocatable :: quantities(:)
@@ -47,24 +48,26 @@ module nocdyn_recorded_analyses
 contains
 
   !> Prepares the response of the base machine, if one is recorded.
-  subroutine new_analysis_reader(input, machine, self, error)
+  subroutine new_analysis_reader(input, machine, kind, self, error)
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! of the input
+    character(len=*), intent(in) :: kind     !! as in `analysis_reader_t`
     type(analysis_reader_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(error_t), allocatable :: failure
     type(forced_response_t), allocatable :: response
     type(mode_t), allocatable :: modes(:)
 
+    self%kind = kind
     allocate (self%wanted_units, source=output_units(input))
     allocate (self%quantities(0), self%limits(0))
-    if (asks_for(input, 'mode') .and. asks_for_steady_modes(input)) then
+    if (asks_for(input, kind, 'mode') .and. asks_for_steady_modes(input, kind)) then
       call oscillating_modes(input, 0, modes, failure)
       if (.not. allocated(failure)) self%oscillations = size(modes)
     end if
-    if (asks_for(input, 'path')) call read_reports(input, self%reports)
-    if (asks_for(input, 'orbit')) call new_orbit_reader(input, machine, self%orbit, error)
-    if (allocated(error) .or. .not. asks_for(input, 'response')) return
+    if (asks_for(input, kind, 'path')) call read_reports(input, kind, self%reports)
+    if (asks_for(input, kind, 'orbit')) call new_orbit_reader(input, machine, self%orbit, error)
+    if (allocated(error) .or. .not. asks_for(input, kind, 'response')) return
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
     call list_moment_forms(machine, self%settings%body, self%quantities)
@@ -76,19 +79,21 @@ contains
   end subroutine new_analysis_reader
 
   !> Whether a &record asks for modes about the steady state.
-  logical function asks_for_steady_modes(input)
+  logical function asks_for_steady_modes(input, kind)
     type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: kind   !! of the groups
     integer, allocatable :: records(:)
     integer :: i
 
-    allocate (records, source=input%groups_named('record'))
+    allocate (records, source=input%groups_named(kind))
     asks_for_steady_modes = any([(input%groups(records(i))%has_value('mode') .and. &
                                   .not. input%groups(records(i))%has_value('order'), i=1, size(records))])
   end function asks_for_steady_modes
 
   !> The reports of the base machine that paths name; without numbers if there is none.
-  subroutine read_reports(input, reports)
+  subroutine read_reports(input, kind, reports)
     type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: kind        !! of the groups
     type(json_t), intent(inout) :: reports(:)   !! [analyses]
     class(analysis_t), allocatable :: analysis
     type(error_t), allocatable :: failure
@@ -97,7 +102,7 @@ contains
     integer :: i, k
 
     is_wanted = .false.
-    allocate (records, source=input%groups_named('record'))
+    allocate (records, source=input%groups_named(kind))
     do i = 1, size(records)
       if (.not. input%groups(records(i))%has_value('path')) cycle
       associate (paths => input%groups(records(i))%texts('path'))
@@ -117,13 +122,13 @@ contains
   end subroutine read_reports
 
   !> Whether a &record has a key.
-  logical function asks_for(input, key)
+  logical function asks_for(input, kind, key)
     type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: key   !! of &record
+    character(len=*), intent(in) :: kind, key   !! of the groups
     integer, allocatable :: records(:)
     integer :: i
 
-    allocate (records, source=input%groups_named('record'))
+    allocate (records, source=input%groups_named(kind))
     asks_for = any([(input%groups(records(i))%has_value(key), i=1, size(records))])
   end function asks_for
 

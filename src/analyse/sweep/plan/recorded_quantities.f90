@@ -40,7 +40,7 @@ contains
     integer :: i
 
     allocate (statistics(0), analyses(0))
-    associate (records => input%groups_named('record'))
+    associate (records => input%groups_named(reader%kind))
       do i = 1, size(records)
         associate (group => input%groups(records(i)))
           if (group%has_value('quantity')) then
@@ -50,11 +50,14 @@ contains
           else if (any([group%has_value('mode'), group%has_value('response'), group%has_value('orbit'), &
                         group%has_value('path')])) then
             call reader%add_results(input, records(i), size(statistics), analyses, diagnostics)
+          else if (group%kind /= 'record') then
+            call diagnostics%add(group%line, records(i), 'no number is named; needed: quantity, fatigue, mode, response, ' // &
+                                 'orbit or path')
           else if (.not. group%has_value('trajectories')) then
             call diagnostics%add(group%line, records(i), 'there is nothing to record; needed: quantity, fatigue, mode, ' // &
                                  'response, orbit, path or trajectories')
           end if
-          if (group%has_value('trajectories')) call check_trajectories(input, records(i), variants, diagnostics)
+          if (group%kind == 'record') call check_trajectories(input, records(i), variants, diagnostics)
         end associate
       end do
     end associate
@@ -202,7 +205,7 @@ contains
     integer :: column, i, unit
     logical :: is_former
 
-    allocate (records, source=input%groups_named('record'))
+    allocate (records, source=input%groups_named(reader%kind))
     do i = 1, size(records)
       associate (group => input%groups(records(i)))
         if (group%has_value('quantity')) then
@@ -286,6 +289,7 @@ contains
     integer, allocatable :: wanted(:)
     integer :: i
 
+    if (.not. input%groups(record)%has_value('trajectories')) return
     allocate (wanted, source=input%groups(record)%whole_numbers('trajectories'))
     do i = 1, size(wanted)
       if (wanted(i) <= variants) cycle

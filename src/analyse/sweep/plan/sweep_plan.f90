@@ -4,7 +4,7 @@ module nocdyn_sweep_plan
   use nocdyn_analysis_results, only: analysis_names, analysis_result_t, of_branch, of_orbit, of_path
   use nocdyn_assembly, only: assemble_machine
   use nocdyn_column_names, only: count_columns
-  use nocdyn_designs, only: design_t
+  use nocdyn_designs, only: design_t, list_design
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: add_error, error_t, exit_input, raise
   use nocdyn_input, only: group_t, input_t
@@ -26,12 +26,12 @@ module nocdyn_sweep_plan
   use nocdyn_targets, only: set_targets, target_t
   use nocdyn_text, only: counted, string_t, to_text
   use nocdyn_text_sort, only: argsort, sorted_position
-  use nocdyn_varied_numbers, only: varied_numbers_t
+  use nocdyn_varied_numbers, only: find_varied_numbers, varied_numbers_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
   private
 
-  public :: make_plan, add_plan_diagnostics, new_sweep_header, has_sweep, remove_sweep, without_sweep
+  public :: make_plan, make_point_plan, add_plan_diagnostics, new_sweep_header, has_sweep, remove_sweep, without_sweep
 
   character(len=*), parameter :: kinds = 'sweep vary record'   ! of the groups of a sweep
 
@@ -61,8 +61,6 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(diagnostics_t) :: diagnostics
     type(error_t), allocatable :: failure
-    type(analysis_reader_t) :: reader
-    type(signal_t), allocatable :: signals(:)
     integer, allocatable :: sweeps(:)
     integer :: variants
 
@@ -75,22 +73,68 @@ contains
     call read_design(input, sweeps(1), plan%numbers, plan%design, plan%list_checksum, diagnostics)
     variants = huge(variants)
     if (allocated(plan%design)) variants = plan%design%variants
-    call list_variant_signals(input, plan%numbers%targets, plan%machine, signals, failure)
-    if (.not. allocated(failure)) call new_analysis_reader(input, plan%machine, reader, failure)
+    call read_quantities('record', variants, plan, diagnostics, failure)
     if (.not. allocated(failure)) then
-      call read_recorded_quantities(input, reader, signals, fixed_span(input, plan%numbers%targets), variants, plan%statistics, &
-                                    plan%analyses, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
-      allocate (plan%notes(0))
-      call note_former_records(input, reader, signals, plan%notes)
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity, fatigue, mode, response, orbit or path', diagnostics)
       if (size(plan%trajectories) > 0) call check_output_times(input, diagnostics)
-      if (.not. allocated(failure)) call count_columns(input, plan%machine, plan%columns, plan%notes, failure)
+      call count_columns(input, plan%machine, plan%columns, plan%notes, failure)
     end if
     call input%refuse(diagnostics, error)
     call add_error(error, failure)
   end subroutine make_plan
+
+  !> The plan of a machine whose numbers are chosen later: the groups of a kind name what is computed. The design is a list of one
+  !> point, 0 in all; another list takes its place.
+  subroutine make_point_plan(input, paths, kind, plan, error)
+    type(input_t), intent(in) :: input
+    type(string_t), intent(in) :: paths(:)     !! of the numbers
+    character(len=*), intent(in) :: kind       !! a group with the keys of &record
+    type(sweep_plan_t), intent(out) :: plan
+    type(error_t), allocatable, intent(out) :: error
+    type(diagnostics_t) :: diagnostics
+    type(error_t), allocatable :: failure
+    type(string_t), allocatable :: messages(:)
+    logical :: are_relative(size(paths))
+    real(wp) :: origin(size(paths), 1)
+    integer :: i
+
+    plan%input = input
+    plan%list_checksum = ''
+    are_relative = .false.
+    origin = 0.0_wp
+    call find_varied_numbers(input, paths, are_relative, plan%numbers, messages)
+    i = findloc([(messages(i)%text /= '', i=1, size(messages))], .true., dim=1)
+    if (i > 0) then
+      call raise(error, exit_input, input%shown_file() // ': ' // messages(i)%text)
+      return
+    end if
+    allocate (plan%design, source=list_design(origin))
+    allocate (plan%trajectories(0))
+    call read_quantities(kind, 1, plan, diagnostics, failure)
+    call input%refuse(diagnostics, error)
+    call add_error(error, failure)
+  end subroutine make_point_plan
+
+  !> Reads what is computed of each variant, with the base machine.
+  subroutine read_quantities(kind, variants, plan, diagnostics, error)
+    character(len=*), intent(in) :: kind      !! of the groups that name it
+    integer, intent(in) :: variants           !! huge if the number is not known
+    type(sweep_plan_t), intent(inout) :: plan !! with the input and the numbers
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(error_t), allocatable, intent(out) :: error
+    type(analysis_reader_t) :: reader
+    type(signal_t), allocatable :: signals(:)
+
+    call list_variant_signals(plan%input, plan%numbers%targets, plan%machine, signals, error)
+    if (.not. allocated(error)) call new_analysis_reader(plan%input, plan%machine, kind, reader, error)
+    if (allocated(error)) return
+    call read_recorded_quantities(plan%input, reader, signals, fixed_span(plan%input, plan%numbers%targets), variants, &
+                                  plan%statistics, plan%analyses, diagnostics)
+    allocate (plan%notes(0))
+    call note_former_records(plan%input, reader, signals, plan%notes)
+  end subroutine read_quantities
 
   !> Adds wrong targets and quantities to the error of an input that cannot be read, if all its errors are in groups of the sweep
   !> and there are targets: the columns can depend on them.

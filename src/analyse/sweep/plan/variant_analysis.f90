@@ -25,7 +25,7 @@ module nocdyn_variant_analysis
   implicit none (type, external)
   private
 
-  public :: analyse_variant, matching_quantities, oscillating_modes
+  public :: analyse_variant, find_valleys, matching_quantities, oscillating_modes
 
   integer, parameter, public :: recorded_kinds(*) = [kind_moment]                  !! of an element, what its name records
   integer, parameter, public :: limited_kinds(*) = [kind_moment, kind_stress, kind_along]  !! and whose limits count
@@ -138,31 +138,15 @@ contains
     type(analysis_result_t), intent(in) :: one
     real(wp), intent(out) :: value   !! in SI
     type(error_t), allocatable, intent(inout) :: error
-    integer, allocatable :: quantities(:)
-    real(wp) :: amplitude(size(analysis%response%points)), largest
-    integer :: i, k, line, peak
+    real(wp) :: amplitude(size(analysis%response%points))
+    integer :: line, peak
 
     value = 0.0_wp
-    allocate (quantities, source=matching_quantities(analysis%response%quantities, one%quantity, recorded_kinds))
     line = line_order(analysis%response%lines, one%order)
-    if (one%order > 0 .and. line == 0) then
-      call raise(error, exit_input, 'order ' // to_text(one%order) // ' is recorded, but no excitation has it')
-    else if (size(quantities) == 0) then
-      call raise(error, exit_input, one%quantity // ' is recorded, but this machine has no such response')
-    end if
+    call find_curve(analysis, one, line, amplitude, error)
     if (allocated(error)) return
-    do i = 1, size(amplitude)
-      ! the largest amplitude of some quantities at a speed
-      largest = 0.0_wp
-      associate (at => analysis%response%points(i))
-        do k = 1, size(quantities)
-          if (line > 0) largest = max(largest, abs(at%quantity(line, quantities(k))))
-          if (line == 0) largest = max(largest, at%half_range(quantities(k)))
-        end do
-      end associate
-      amplitude(i) = largest
-    end do
-    peak = maxloc(amplitude, dim=1)
+    peak = maxloc(amplitude, dim=1, mask=is_between(analysis, one%window))
+    if (peak == 0) return   ! no speed there
     associate (speed => analysis%response%points(peak)%state%speed)
       select case (one%statistic)
       case (analysis_peak)
@@ -177,6 +161,88 @@ contains
       end select
     end associate
   end subroutine find_response_value
+
+  !> The amplitude of an order, or the half range of all, of the largest of its quantities at each point of a response.
+  subroutine find_curve(analysis, one, line, amplitude, error)
+    type(response_analysis_t), intent(in) :: analysis
+    type(analysis_result_t), intent(in) :: one
+    integer, intent(in) :: line                 !! of its order, 0: all
+    real(wp), intent(out) :: amplitude(:)       !! [points]
+    type(error_t), allocatable, intent(inout) :: error
+    integer, allocatable :: quantities(:)
+    integer :: i, k
+
+    allocate (quantities, source=matching_quantities(analysis%response%quantities, one%quantity, recorded_kinds))
+    amplitude = 0.0_wp
+    if (one%order > 0 .and. line == 0) then
+      call raise(error, exit_input, 'order ' // to_text(one%order) // ' is recorded, but no excitation has it')
+    else if (size(quantities) == 0) then
+      call raise(error, exit_input, one%quantity // ' is recorded, but this machine has no such response')
+    end if
+    if (allocated(error)) return
+    do i = 1, size(amplitude)
+      associate (at => analysis%response%points(i))
+        do k = 1, size(quantities)
+          if (line > 0) amplitude(i) = max(amplitude(i), abs(at%quantity(line, quantities(k))))
+          if (line == 0) amplitude(i) = max(amplitude(i), at%half_range(quantities(k)))
+        end do
+      end associate
+    end do
+  end subroutine find_curve
+
+  !> The points of a response whose speeds are in a window.
+  pure function is_between(analysis, window)
+    type(response_analysis_t), intent(in) :: analysis
+    real(wp), intent(in) :: window(2)   !! [rad/s]
+    logical :: is_between(size(analysis%response%points))
+    integer :: i
+
+    do i = 1, size(is_between)
+      associate (speed => analysis%response%points(i)%state%speed)
+        is_between(i) = speed >= window(1) .and. speed <= window(2)
+      end associate
+    end do
+  end function is_between
+
+  !> The speeds of the valleys between the high peaks of a response, at least half as high as the highest.
+  subroutine find_valleys(input, one, valleys, error)
+    type(input_t), intent(in) :: input
+    type(analysis_result_t), intent(in) :: one           !! of a response
+    real(wp), allocatable, intent(out) :: valleys(:)     !! ascending [rad/s]
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), parameter :: high = 0.5_wp, deep = 0.999_wp   ! of the highest peak; of the lower one of two peaks
+    class(analysis_t), allocatable :: command
+    type(machine_t) :: machine
+    type(response_analysis_t) :: analysis
+    real(wp), allocatable :: amplitude(:)
+    integer :: i, lowest, peak   ! points: the lowest one since the last peak, which is the highest one since the last valley
+
+    allocate (valleys(0))
+    call new_analysis('response', command)
+    call assemble_analysed('response', command, input, machine, error)
+    if (.not. allocated(error)) call analyse_response(input, machine, analysis, error)
+    if (allocated(error)) return
+    allocate (amplitude(size(analysis%response%points)))
+    call find_curve(analysis, one, line_order(analysis%response%lines, one%order), amplitude, error)
+    if (allocated(error)) return
+    associate (least => high * maxval(amplitude))
+      peak = 1
+      lowest = 1
+      do i = 2, size(amplitude)
+        if (min(amplitude(peak), amplitude(i)) * deep > amplitude(lowest) .and. &
+            min(amplitude(peak), amplitude(i)) >= least) then
+          valleys = [valleys, analysis%response%points(lowest)%state%speed]
+          peak = i
+          lowest = i
+        else if (amplitude(i) > amplitude(peak)) then
+          peak = i
+          lowest = i
+        else if (amplitude(i) < amplitude(lowest)) then
+          lowest = i
+        end if
+      end do
+    end associate
+  end subroutine find_valleys
 
   !> The critical speed that a peak belongs to, as the table of the response has it; the speed of the peak if there is none near.
   pure real(wp) function critical_speed(analysis, line, peak) result(speed)

@@ -14,7 +14,7 @@ module nocdyn_catalogues
   implicit none (type, external)
   private
 
-  public :: read_catalogue, take_catalogue
+  public :: list_sizes, read_catalogue, take_catalogue
 
   character(len=*), parameter :: size_column = 'size', remarks = 'maker type price mass speed_limit remark'
 
@@ -153,18 +153,16 @@ contains
     row = 0
   end function row_of
 
-  !> Gives a group the values of its size that it has not itself. They are not written: they follow from the catalogue, which is.
-  subroutine take_catalogue(raw, group, diagnostics)
-    type(raw_group_t), intent(in) :: raw
-    type(group_t), intent(inout) :: group   !! with the lines of its file
-    type(diagnostics_t), intent(inout) :: diagnostics
-    type(catalogue_t) :: catalogue
-    type(string_t), allocatable :: lines(:), messages(:)
-    character(len=:), allocatable :: file, text
-    integer :: c, i, row
+  !> The catalogue of a group that has one.
+  subroutine read_lines(group, file, catalogue, messages)
+    type(group_t), intent(in) :: group
+    character(len=:), allocatable, intent(out) :: file   !! as in `read_catalogue`
+    type(catalogue_t), intent(out) :: catalogue
+    type(string_t), allocatable, intent(out) :: messages(:)
+    character(len=:), allocatable :: text
+    type(string_t), allocatable :: lines(:)
+    integer :: i
 
-    if (group%kind /= 'coupling') return
-    if (.not. (group%has_value('catalogue_lines') .and. group%has_value('size'))) return
     file = 'catalogue_lines'
     if (group%has_value('catalogue_file')) file = shown_path(group%text('catalogue_file'))
     allocate (lines, source=group%texts('catalogue_lines'))
@@ -173,6 +171,37 @@ contains
       text = text // lines(i)%text // new_line('a')
     end do
     call read_catalogue(text, file, group%rule, catalogue, messages)
+  end subroutine read_lines
+
+  !> The sizes in the catalogue of a group of an input without mistakes; none without a catalogue.
+  subroutine list_sizes(group, sizes)
+    type(group_t), intent(in) :: group   !! &coupling
+    type(string_t), allocatable, intent(out) :: sizes(:)
+    type(catalogue_t) :: catalogue
+    type(string_t), allocatable :: messages(:)
+    character(len=:), allocatable :: file
+
+    if (group%has_value('catalogue_lines') .and. group%has_value('size')) then
+      call read_lines(group, file, catalogue, messages)
+      call move_alloc(catalogue%sizes, sizes)
+    else
+      allocate (sizes(0))
+    end if
+  end subroutine list_sizes
+
+  !> Gives a group the values of its size that it has not itself. They are not written: they follow from the catalogue, which is.
+  subroutine take_catalogue(raw, group, diagnostics)
+    type(raw_group_t), intent(in) :: raw
+    type(group_t), intent(inout) :: group   !! with the lines of its file
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(catalogue_t) :: catalogue
+    type(string_t), allocatable :: messages(:)
+    character(len=:), allocatable :: file
+    integer :: c, i, row
+
+    if (group%kind /= 'coupling') return
+    if (.not. (group%has_value('catalogue_lines') .and. group%has_value('size'))) return
+    call read_lines(group, file, catalogue, messages)
     associate (source => group%values(group%key_position('catalogue_lines')), chosen => group%values(group%key_position('size')))
       do i = 1, size(messages)
         call diagnostics%add(max(source%line, group%line), raw%index, messages(i)%text, source%override)

@@ -25,7 +25,7 @@ module nocdyn_schema_rules
     topic_t('simulation', 'the motion over time, and what is written'), &
     topic_t('torsional',  'vibrations over the speed, critical speeds, limits'), &
     topic_t('sweeps',     'many variants of a machine'), &
-    topic_t('fits',       'numbers that are found from measurements')]
+    topic_t('fits',       'numbers that are found: from measurements, or best ones')]
 
   ! Occurrence of a group.
   integer, parameter, public :: exactly_once = 1, at_most_once = 2, at_least_once = 3, any_times = 4

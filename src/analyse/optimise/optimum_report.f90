@@ -1,0 +1,323 @@
+!> Reports on the best choice: what is printed, optimise.csv with all candidates, and optimise.json.
+module nocdyn_optimum_report
+  use nocdyn_csv, only: text_cell
+  use nocdyn_input, only: input_t
+  use nocdyn_json, only: json_t
+  use nocdyn_kinds, only: wp
+  use nocdyn_minimax, only: kept
+  use nocdyn_optimum_search, only: candidate_t, optimum_t
+  use nocdyn_output_file, only: output_file_t
+  use nocdyn_table_text, only: cell, padded, text_width
+  use nocdyn_text, only: append, counted, joined, rounded_text, string_t, to_text
+  use nocdyn_text_buffer, only: text_buffer_t
+  implicit none (type, external)
+  private
+
+  public :: list_optimum_notes, optimum_csv, optimum_text, put_optimum
+
+  integer, parameter :: most_printed = 20   ! candidates and limits; all are in the files
+  real(wp), parameter :: at_end = 1.0e-6_wp, at_limit = 1.0e-3_wp   ! shares of ranges and limits
+  character(len=*), parameter :: line_end = new_line('a')
+
+contains
+
+  !> What a reader must know of the best choice.
+  subroutine list_optimum_notes(self)
+    type(optimum_t), intent(inout) :: self
+    type(string_t), allocatable :: active(:), broken(:)
+    integer :: i
+
+    allocate (active(0), broken(0))
+    associate (best => self%candidates(self%best))
+      do i = 1, size(self%numbers)
+        associate (one => self%numbers(i), value => best%values(i))
+          if (.not. one%is_continuous) cycle
+          if (value - one%low <= at_end * (one%high - one%low)) then
+            call append(self%notes, one%path // ' is at its bound low = ' // to_text(one%low) // &
+                                    ': a better one may lie beyond')
+          else if (one%high - value <= at_end * (one%high - one%low)) then
+            call append(self%notes, one%path // ' is at its bound high = ' // to_text(one%high) // &
+                                    ': a better one may lie beyond')
+          end if
+        end associate
+      end do
+      do i = 1, size(self%bounds)
+        if (best%point%limit(i) > kept) then
+          call append(broken, self%bounds(i)%label // ' (' // ratio_text(best%point%limit(i)) // ')')
+        else if (best%point%limit(i) > -at_limit) then
+          call append(active, self%bounds(i)%label)
+        end if
+      end do
+      if (size(broken) > 0) call append(self%notes, 'no choice keeps all limits; the one that exceeds them least exceeds ' // &
+                                                    joined(broken, '; ', 4))
+      if (size(active) > 0) call append(self%notes, 'a limit is what keeps it from being better: ' // joined(active, '; ', 4))
+      if (size(self%objectives) > 1) call append(self%notes, 'of the objectives, the worst counts, each over its scale: ' // &
+                                                 self%objectives(maxloc(best%point%goal, dim=1))%label)
+    end associate
+    associate (failed => count([(.not. self%candidates(i)%point%is_valid, i=1, size(self%candidates))]))
+      if (failed > 0) call append(self%notes, counted(failed, 'combination gives', 'combinations give') // ' no objective')
+    end associate
+  end subroutine list_optimum_notes
+
+  !> "98.2 %" of a limit.
+  function ratio_text(excess) result(text)
+    real(wp), intent(in) :: excess
+    character(len=:), allocatable :: text
+
+    text = rounded_text(100.0_wp * (1.0_wp + excess), 4) // ' %'
+  end function ratio_text
+
+  !> The table of what is chosen and what it gives.
+  function optimum_text(file, self) result(text)
+    character(len=*), intent(in) :: file
+    type(optimum_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    character(len=:), allocatable :: line
+    type(text_buffer_t) :: report
+    integer :: i, width
+
+    do i = 1, size(self%notes)
+      call report%append_line(file // ': note: ' // self%notes(i)%text)
+    end do
+    line = file // ': best of ' // counted(self%evaluations, 'machine', 'machines')
+    if (size(self%candidates) > 1) line = line // ' in ' // to_text(size(self%candidates)) // ' combinations'
+    call report%append_line(line)
+    width = max(10, widest(self))
+    associate (best => self%candidates(self%best))
+      call report%append_line('  ' // padded('chosen', width) // cell('before') // cell('best') // cell('low') // cell('high'))
+      do i = 1, size(self%sizes)
+        call report%append_line('  ' // padded(self%sizes(i)%path, width) // cell(self%before%sizes(i)%text) // &
+                                cell(best%sizes(i)%text))
+      end do
+      do i = 1, size(self%numbers)
+        associate (one => self%numbers(i))
+          call report%append_line('  ' // padded(one%path, width) // cell(one%before) // cell(best%values(i)) // cell(one%low) // &
+                                  cell(one%high) // '  ' // one%unit)
+        end associate
+      end do
+      call report%append_line('  ' // padded('objective', width) // cell('before') // cell('best') // cell('goal'))
+      do i = 1, size(self%objectives)
+        associate (one => self%objectives(i))
+          line = '  ' // padded(one%label, width)
+          if (self%before%point%is_valid) then
+            line = line // cell(one%value(self%before%point%goal(i)))
+          else
+            line = line // cell('none')
+          end if
+          call report%append_line(line // cell(one%value(best%point%goal(i))) // &
+                                  cell(trim(merge('smallest', 'largest ', one%is_minimised))) // '  ' // one%unit)
+        end associate
+      end do
+      if (size(self%bounds) > 0) call report%append_line('  ' // padded('of limit', width) // cell('before') // cell('best'))
+      do i = 1, min(size(self%bounds), most_printed)
+        line = '  ' // padded(self%bounds(i)%label, width)
+        if (self%before%point%is_valid) then
+          line = line // cell(ratio_text(self%before%point%limit(i)))
+        else
+          line = line // cell('none')
+        end if
+        call report%append_line(line // cell(ratio_text(best%point%limit(i))))
+      end do
+    end associate
+    if (size(self%candidates) > 1) call append_candidates(self, report)
+    text = report%text()
+  end function optimum_text
+
+  pure integer function widest(self)
+    type(optimum_t), intent(in) :: self
+    integer :: i
+
+    widest = maxval([(len(self%numbers(i)%path), i=1, size(self%numbers)), &
+                     (len(self%sizes(i)%path), i=1, size(self%sizes)), &
+                     (text_width(self%objectives(i)%label), i=1, size(self%objectives)), &
+                     (text_width(self%bounds(i)%label), i=1, size(self%bounds))])
+  end function widest
+
+  !> The combinations, the best first.
+  subroutine append_candidates(self, report)
+    type(optimum_t), intent(in) :: self
+    type(text_buffer_t), intent(inout) :: report
+    character(len=:), allocatable :: line
+    integer, allocatable :: order(:)
+    integer :: i, k
+
+    call rank_candidates(self%candidates, order)
+    line = ' '
+    do i = 1, size(self%sizes)
+      line = line // cell('size')
+    end do
+    do i = 1, size(self%numbers)
+      line = line // cell(last_part(self%numbers(i)%path))
+    end do
+    do i = 1, size(self%objectives)
+      line = line // cell('objective')
+    end do
+    if (size(self%bounds) > 0) line = line // cell('of limits')
+    call report%append_line(line)
+    do k = 1, size(order)
+      associate (one => self%candidates(order(k)))
+        line = ' '
+        do i = 1, size(self%sizes)
+          line = line // cell(one%sizes(i)%text)
+        end do
+        do i = 1, size(self%numbers)
+          line = line // cell(one%values(i))
+        end do
+        if (.not. one%point%is_valid) then
+          line = line // '  none'
+        else
+          do i = 1, size(self%objectives)
+            line = line // cell(self%objectives(i)%value(one%point%goal(i)))
+          end do
+          if (size(self%bounds) > 0) line = line // cell(ratio_text(maxval(one%point%limit)))
+        end if
+      end associate
+      call report%append_line(line)
+    end do
+    if (size(order) < size(self%candidates)) then
+      call report%append_line('  (' // to_text(size(self%candidates) - size(order)) // ' more combinations in optimise.csv)')
+    end if
+  end subroutine append_candidates
+
+  !> The key of a path.
+  pure function last_part(path) result(key)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: key
+
+    key = path(index(path, '.', back=.true.) + 1:)
+  end function last_part
+
+  !> The first candidates by their goals, those that exceed limits last.
+  subroutine rank_candidates(candidates, order)
+    type(candidate_t), intent(in) :: candidates(:)
+    integer, allocatable, intent(out) :: order(:)
+    real(wp), parameter :: exceeded = 1.0e100_wp
+    real(wp) :: merit(size(candidates))
+    logical :: is_left(size(candidates))
+    integer :: i, k
+
+    do i = 1, size(candidates)
+      associate (point => candidates(i)%point)
+        merit(i) = huge(1.0_wp)
+        if (point%is_valid) merit(i) = point%worst()
+        if (point%is_valid .and. point%excess() > 0) merit(i) = exceeded * (1.0_wp + point%excess())
+      end associate
+    end do
+    is_left = .true.
+    allocate (order(min(size(candidates), most_printed)))
+    do k = 1, size(order)
+      order(k) = minloc(merit, dim=1, mask=is_left)
+      is_left(order(k)) = .false.
+    end do
+  end subroutine rank_candidates
+
+  !> optimise.csv: a row for each candidate.
+  subroutine optimum_csv(self, file)
+    type(optimum_t), intent(in) :: self
+    type(output_file_t), intent(inout) :: file
+    integer :: i, k
+
+    call file%put('best')
+    do i = 1, size(self%sizes)
+      call file%put(',' // text_cell(self%sizes(i)%path))
+    end do
+    do i = 1, size(self%numbers)
+      call file%put(',' // text_cell(with_unit(self%numbers(i)%path, self%numbers(i)%unit)))
+    end do
+    do i = 1, size(self%objectives)
+      call file%put(',' // text_cell(with_unit(self%objectives(i)%label, self%objectives(i)%unit)))
+    end do
+    do i = 1, size(self%bounds)
+      call file%put(',' // text_cell(self%bounds(i)%label // ' [of limit]'))
+    end do
+    call file%put(line_end)
+    do k = 1, size(self%candidates)
+      associate (one => self%candidates(k))
+        call file%put(trim(merge('yes', 'no ', k == self%best)))
+        do i = 1, size(self%sizes)
+          call file%put(',' // text_cell(one%sizes(i)%text))
+        end do
+        call file%put_numbers(one%values, ',')
+        if (one%point%is_valid) then
+          call file%put_numbers([(self%objectives(i)%value(one%point%goal(i)), i=1, size(self%objectives))], ',')
+          call file%put_numbers(1.0_wp + one%point%limit, ',')
+        else
+          call file%put(repeat(',', size(self%objectives) + size(self%bounds)))
+        end if
+        call file%put(line_end)
+      end associate
+    end do
+  end subroutine optimum_csv
+
+  !> "coupling.rubber.stiffness [N m/rad]".
+  pure function with_unit(name, unit) result(text)
+    character(len=*), intent(in) :: name, unit
+    character(len=:), allocatable :: text
+
+    text = name
+    if (unit /= '') text = name // ' [' // unit // ']'
+  end function with_unit
+
+  !> The members of optimise.json.
+  subroutine put_optimum(json, input, self)
+    type(json_t), intent(inout) :: json
+    type(input_t), intent(in) :: input
+    type(optimum_t), intent(in) :: self
+    integer :: i
+
+    call json%open_report(input%file, input%title())
+    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call json%put('notes', self%notes)
+    call json%put('evaluations', self%evaluations)
+    call json%put('combinations', size(self%candidates))
+    associate (best => self%candidates(self%best), before => self%before)
+      call json%put('keeps_limits', .not. best%point%excess() > 0)
+      call json%open_list('sizes')
+      do i = 1, size(self%sizes)
+        call json%open()
+        call json%put('target', self%sizes(i)%path)
+        call json%put('before', before%sizes(i)%text)
+        call json%put('best', best%sizes(i)%text)
+        call json%close()
+      end do
+      call json%close_list()
+      call json%open_list('numbers')
+      do i = 1, size(self%numbers)
+        call json%open()
+        call json%put('target', self%numbers(i)%path)
+        call json%put('unit', self%numbers(i)%unit)
+        call json%put('before', self%numbers(i)%before)
+        call json%put('best', best%values(i))
+        call json%put('low', self%numbers(i)%low)
+        call json%put('high', self%numbers(i)%high)
+        call json%close()
+      end do
+      call json%close_list()
+      call json%open_list('objectives')
+      do i = 1, size(self%objectives)
+        associate (one => self%objectives(i))
+          call json%open()
+          call json%put('name', one%label)
+          call json%put('unit', one%unit)
+          call json%put('goal', trim(merge('minimise', 'maximise', one%is_minimised)))
+          call json%put('scale', one%scale)
+          if (before%point%is_valid) call json%put('before', one%value(before%point%goal(i)))
+          call json%put('best', one%value(best%point%goal(i)))
+          call json%close()
+        end associate
+      end do
+      call json%close_list()
+      call json%open_list('limits')
+      do i = 1, size(self%bounds)
+        call json%open()
+        call json%put('name', self%bounds(i)%label)
+        if (before%point%is_valid) call json%put('ratio_before', 1.0_wp + before%point%limit(i))
+        call json%put('ratio', 1.0_wp + best%point%limit(i))
+        call json%close()
+      end do
+      call json%close_list()
+    end associate
+    call json%close()
+  end subroutine put_optimum
+
+end module nocdyn_optimum_report
