@@ -28,6 +28,7 @@ module nocdyn_design_choices
   end type design_size_t
 
   integer, parameter :: most_values = 10000           ! of one number
+  real(wp), parameter :: rounding = 1.0e-9_wp         ! of a number of steps
   real(wp), parameter :: wide = 10.0_wp               ! ratio of bounds of a logarithmic number
   character(len=*), parameter :: coupling = 'coupling.', size_key = '.size'
 
@@ -132,13 +133,14 @@ contains
         low = group%number('low')
         high = group%number('high')
         if (group%has_value('step')) then
-          steps = (high - low) / group%number('step') + 1.0e-9_wp
+          steps = (high - low) / group%number('step') + 0.5_wp * rounding
           if (steps >= most_values) then
             call input%report(g, 'step', 'step = ' // to_text(group%number('step')) // ' gives more than ' // &
                               to_text(most_values) // ' values; allowed: a larger one', diagnostics)
             return
           end if
           allocate (self%values, source=[(low + i * group%number('step'), i=0, int(steps))])
+          if (abs(steps - anint(steps)) < rounding) self%values(size(self%values)) = high
         end if
       end if
       self%is_continuous = .not. allocated(self%values)

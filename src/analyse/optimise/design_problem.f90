@@ -25,7 +25,7 @@ module nocdyn_design_problem
   implicit none (type, external)
   private
 
-  public :: new_design_problem
+  public :: add_bound, new_design_problem
 
   !> One objective.
   type, public :: objective_t
@@ -195,6 +195,7 @@ contains
     end do
   end subroutine add_verdict_limits
 
+  !> Adds a limit.
   subroutine add_bound(bounds, label, largest)
     type(design_limit_t), allocatable, intent(inout) :: bounds(:)
     character(len=*), intent(in) :: label

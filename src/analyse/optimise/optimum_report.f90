@@ -8,7 +8,7 @@ module nocdyn_optimum_report
   use nocdyn_optimum_search, only: candidate_t, optimum_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_table_text, only: cell, padded, text_width
-  use nocdyn_text, only: append, counted, joined, rounded_text, string_t, to_text
+  use nocdyn_text, only: append, counted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -24,10 +24,11 @@ contains
   !> What a reader must know of the best choice.
   subroutine list_optimum_notes(self)
     type(optimum_t), intent(inout) :: self
-    type(string_t), allocatable :: active(:), broken(:)
+    character(len=:), allocatable :: active, broken
     integer :: i
 
-    allocate (active(0), broken(0))
+    active = ''
+    broken = ''
     associate (best => self%candidates(self%best))
       do i = 1, size(self%numbers)
         associate (one => self%numbers(i), value => best%values(i))
@@ -42,15 +43,14 @@ contains
         end associate
       end do
       do i = 1, size(self%bounds)
-        if (best%point%limit(i) > kept) then
-          call append(broken, self%bounds(i)%label // ' (' // ratio_text(best%point%limit(i)) // ')')
-        else if (best%point%limit(i) > -at_limit) then
-          call append(active, self%bounds(i)%label)
+        if (best%excess_of(i) > kept) then
+          broken = broken // '; ' // self%bounds(i)%label // ', ' // ratio_text(best, i)
+        else if (best%excess_of(i) > -at_limit) then
+          active = active // '; ' // self%bounds(i)%label
         end if
       end do
-      if (size(broken) > 0) call append(self%notes, 'no choice keeps all limits; the one that exceeds them least exceeds ' // &
-                                                    joined(broken, '; ', 4))
-      if (size(active) > 0) call append(self%notes, 'a limit is what keeps it from being better: ' // joined(active, '; ', 4))
+      if (broken /= '') call append(self%notes, 'no choice keeps all limits; of the one that exceeds them least: ' // broken(3:))
+      if (active /= '') call append(self%notes, 'a limit is what keeps it from being better: ' // active(3:))
       if (size(self%objectives) > 1) call append(self%notes, 'of the objectives, the worst counts, each over its scale: ' // &
                                                  self%objectives(maxloc(best%point%goal, dim=1))%label)
     end associate
@@ -60,11 +60,13 @@ contains
   end subroutine list_optimum_notes
 
   !> "98.2 %" of a limit.
-  function ratio_text(excess) result(text)
-    real(wp), intent(in) :: excess
+  function ratio_text(candidate, bound) result(text)
+    type(candidate_t), intent(in) :: candidate
+    integer, intent(in) :: bound
     character(len=:), allocatable :: text
 
-    text = rounded_text(100.0_wp * (1.0_wp + excess), 4) // ' %'
+    text = 'none'
+    if (candidate%has_limit(bound)) text = rounded_text(100.0_wp * (1.0_wp + candidate%excess_of(bound)), 4) // ' %'
   end function ratio_text
 
   !> The table of what is chosen and what it gives.
@@ -110,13 +112,8 @@ contains
       end do
       if (size(self%bounds) > 0) call report%append_line('  ' // padded('of limit', width) // cell('before') // cell('best'))
       do i = 1, min(size(self%bounds), most_printed)
-        line = '  ' // padded(self%bounds(i)%label, width)
-        if (self%before%point%is_valid) then
-          line = line // cell(ratio_text(self%before%point%limit(i)))
-        else
-          line = line // cell('none')
-        end if
-        call report%append_line(line // cell(ratio_text(best%point%limit(i))))
+        call report%append_line('  ' // padded(self%bounds(i)%label, width) // cell(ratio_text(self%before, i)) // &
+                                cell(ratio_text(best, i)))
       end do
     end associate
     if (size(self%candidates) > 1) call append_candidates(self, report)
@@ -150,7 +147,8 @@ contains
       line = line // cell(last_part(self%numbers(i)%path))
     end do
     do i = 1, size(self%objectives)
-      line = line // cell('objective')
+      if (size(self%objectives) == 1) line = line // cell('objective')
+      if (size(self%objectives) > 1) line = line // cell('objective ' // to_text(i))
     end do
     if (size(self%bounds) > 0) line = line // cell('of limits')
     call report%append_line(line)
@@ -169,7 +167,8 @@ contains
           do i = 1, size(self%objectives)
             line = line // cell(self%objectives(i)%value(one%point%goal(i)))
           end do
-          if (size(self%bounds) > 0) line = line // cell(ratio_text(maxval(one%point%limit)))
+          if (size(one%point%limit) > 0) line = line // cell(ratio_text(one, maxloc([(one%excess_of(i), &
+                                                                                     i=1, size(self%bounds))], dim=1)))
         end if
       end associate
       call report%append_line(line)
@@ -240,10 +239,16 @@ contains
         call file%put_numbers(one%values, ',')
         if (one%point%is_valid) then
           call file%put_numbers([(self%objectives(i)%value(one%point%goal(i)), i=1, size(self%objectives))], ',')
-          call file%put_numbers(1.0_wp + one%point%limit, ',')
         else
-          call file%put(repeat(',', size(self%objectives) + size(self%bounds)))
+          call file%put(repeat(',', size(self%objectives)))
         end if
+        do i = 1, size(self%bounds)
+          if (one%has_limit(i)) then
+            call file%put_numbers([1.0_wp + one%excess_of(i)], ',')
+          else
+            call file%put(',')
+          end if
+        end do
         call file%put(line_end)
       end associate
     end do
@@ -311,8 +316,8 @@ contains
       do i = 1, size(self%bounds)
         call json%open()
         call json%put('name', self%bounds(i)%label)
-        if (before%point%is_valid) call json%put('ratio_before', 1.0_wp + before%point%limit(i))
-        call json%put('ratio', 1.0_wp + best%point%limit(i))
+        if (before%has_limit(i)) call json%put('ratio_before', 1.0_wp + before%excess_of(i))
+        if (best%has_limit(i)) call json%put('ratio', 1.0_wp + best%excess_of(i))
         call json%close()
       end do
       call json%close_list()

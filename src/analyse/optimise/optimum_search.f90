@@ -2,7 +2,7 @@
 !> numbers between bounds, from their start and from the best of many points of Sobol.
 module nocdyn_optimum_search
   use nocdyn_design_choices, only: design_number_t, design_size_t
-  use nocdyn_design_problem, only: design_limit_t, design_problem_t, new_design_problem, objective_t
+  use nocdyn_design_problem, only: add_bound, design_limit_t, design_problem_t, new_design_problem, objective_t
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_free_numbers, only: set_free_numbers
   use nocdyn_input, only: input_t
@@ -22,6 +22,9 @@ module nocdyn_optimum_search
     type(string_t), allocatable :: sizes(:)     !! [sizes]
     real(wp), allocatable :: values(:)          !! [numbers]
     type(worst_point_t) :: point                !! its goals are those of `objectives`
+    integer, allocatable :: limit(:)            !! of the point, for each of `bounds`, 0: its sizes have no such limit
+  contains
+    procedure :: excess_of, has_limit
   end type candidate_t
 
   !> What has been found.
@@ -29,7 +32,7 @@ module nocdyn_optimum_search
     type(design_number_t), allocatable :: numbers(:)
     type(design_size_t), allocatable :: sizes(:)
     type(objective_t), allocatable :: objectives(:)
-    type(design_limit_t), allocatable :: bounds(:)
+    type(design_limit_t), allocatable :: bounds(:)    !! of all candidates
     type(candidate_t) :: before                       !! the input as it is
     type(candidate_t), allocatable :: candidates(:)   !! the best of each combination, or all if there are no free numbers
     integer :: best = 0                               !! of these
@@ -38,6 +41,7 @@ module nocdyn_optimum_search
     type(string_t), allocatable :: notes(:)
   end type optimum_t
 
+  real(wp), parameter :: at_end = 1.0e-8_wp   ! so near to a bound is at it
   integer, parameter :: usual_starts = 4, points_of_start = 16       ! points of Sobol for each start
   integer, parameter :: most_combinations = 100000, most_searches = 1000
 
@@ -72,10 +76,12 @@ contains
       if (.not. allocated(error)) call new_design_problem(changed, numbers, problem, error)
       if (allocated(error)) return
       first = size(self%candidates) + 1
+      call add_bounds(problem%bounds, self%bounds)
       call search_values(problem, self)
       do i = first, size(self%candidates)
         allocate (self%candidates(i)%sizes(size(sizes)))
         call name_sizes(sizes, chosen, self%candidates(i)%sizes)
+        call find_limits(self%bounds, problem%bounds, self%candidates(i)%limit)
       end do
       if (reason == '') reason = problem%reason
       if (.not. has_next(chosen, counts)) exit
@@ -145,7 +151,49 @@ contains
     problem%fixed = self%before%values
     call problem%evaluate(none, points)
     self%before%point = points(1)
+    call find_limits(self%bounds, problem%bounds, self%before%limit)
   end subroutine find_before
+
+  !> Adds limits that are not there.
+  subroutine add_bounds(own, bounds)
+    type(design_limit_t), intent(in) :: own(:)
+    type(design_limit_t), allocatable, intent(inout) :: bounds(:)
+    integer :: i, k
+
+    do i = 1, size(own)
+      if (.not. any([(bounds(k)%label == own(i)%label, k=1, size(bounds))])) call add_bound(bounds, own(i)%label, own(i)%largest)
+    end do
+  end subroutine add_bounds
+
+  !> Which of its own limits each limit is, 0: none.
+  subroutine find_limits(bounds, own, limit)
+    type(design_limit_t), intent(in) :: bounds(:), own(:)
+    integer, allocatable, intent(out) :: limit(:)   !! [bounds]
+    integer :: i, k
+
+    allocate (limit(size(bounds)))
+    do i = 1, size(bounds)
+      limit(i) = findloc([(own(k)%label == bounds(i)%label, k=1, size(own))], .true., dim=1)
+    end do
+  end subroutine find_limits
+
+  !> By how much a candidate exceeds a limit, as a share of it; negative if it keeps it, -1 without such a limit.
+  pure real(wp) function excess_of(self, bound) result(excess)
+    class(candidate_t), intent(in) :: self
+    integer, intent(in) :: bound   !! of all candidates
+
+    excess = -1.0_wp
+    if (self%has_limit(bound)) excess = self%point%limit(self%limit(bound))
+  end function excess_of
+
+  !> Whether a candidate is compared with a limit.
+  pure logical function has_limit(self, bound)
+    class(candidate_t), intent(in) :: self
+    integer, intent(in) :: bound   !! of all candidates
+
+    has_limit = self%point%is_valid .and. bound <= size(self%limit)
+    if (has_limit) has_limit = self%limit(bound) > 0
+  end function has_limit
 
   !> The best values for the sizes of a problem: a candidate for each combination of values of lists.
   subroutine search_values(problem, self)
@@ -234,6 +282,8 @@ contains
     end do
     call problem%reset()
     if (best%is_valid) then   ! with a goal for each objective
+      where (best%x < at_end) best%x = 0.0_wp
+      where (best%x > 1.0_wp - at_end) best%x = 1.0_wp
       call problem%evaluate(reshape(best%x, [n, 1]), points)
       best = points(1)
       call add_candidate(self, best, problem%values_at(best%x))

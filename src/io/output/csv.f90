@@ -24,13 +24,20 @@ contains
     call file%put(new_line('a'))
   end subroutine write_header
 
-  !> A name as a cell. A name that spreadsheets would take for a formula is a text with an apostrophe before it.
-  pure function text_cell(name) result(cell)
-    character(len=*), intent(in) :: name   !! without commas and quotes
+  !> A text as a cell, in quotes if it has commas or quotes. A text that spreadsheets would take for a formula has an apostrophe
+  !> before it.
+  pure function text_cell(text) result(cell)
+    character(len=*), intent(in) :: text
     character(len=:), allocatable :: cell
+    integer :: i
 
-    cell = as_utf_8(name)
-    if (scan(name(:min(1, len(name))), '=+-@') > 0) cell = '"''' // cell // '"'
+    cell = as_utf_8(text)
+    if (scan(text(:min(1, len(text))), '=+-@') > 0) cell = "'" // cell
+    if (scan(text, ',"') + len(cell) - len(as_utf_8(text)) == 0) return
+    do i = len(cell), 1, -1
+      if (cell(i:i) == '"') cell = cell(:i) // cell(i:)
+    end do
+    cell = '"' // cell // '"'
   end function text_cell
 
   !> Writes one row.
