@@ -19,7 +19,7 @@ def one_line(text):
             ["rnu", "x.nml"],
             "'rnu' is not a command; did you mean 'run'? "
             "allowed: 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'sensitivity', 'fit', 'orbit', 'transit', "
-            "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'import', 'verify', 'new', 'help'",
+            "'matrices', 'sweep', 'optimise', 'merge', 'plot', 'report', 'fmu', 'import', 'verify', 'new', 'help'",
         ),
         (["simulate"], "'simulate' is not a command"),
         (["x" * 3000], "'" + "x" * 80 + " ...' is not a command; allowed: "),
@@ -47,23 +47,23 @@ def one_line(text):
         (
             ["new", "a.nml", "--out", "a"],
             "--out is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, "
-            "transit and sweep",
+            "transit, sweep and optimise",
         ),
         (["modes", CASE_1, "--at"], "--at needs a value: --at equilibrium|rest|TIME\n"),
         (["modes", CASE_1, "--at", "rest", "--at=0"], "--at is given twice"),
         (["equilibrium", CASE_1, "--at", "rest"], "--at is an option of nocdyn modes and sensitivity"),
         (
             ["modes", CASE_1, "--quiet"],
-            "--quiet is an option of nocdyn run, response, campbell, fit, orbit, transit, sweep and merge",
+            "--quiet is an option of nocdyn run, response, campbell, fit, orbit, transit, sweep, optimise and merge",
         ),
         (
             ["check", CASE_1, "--quiet"],
-            "--quiet is an option of nocdyn run, response, campbell, fit, orbit, transit, sweep and merge",
+            "--quiet is an option of nocdyn run, response, campbell, fit, orbit, transit, sweep, optimise and merge",
         ),
         (
             ["new", "a.nml", "--set", "run.t_end=1"],
             "--set is an option of nocdyn run, check, equilibrium, modes, response, campbell, sensitivity, fit, orbit, "
-            "transit, matrices and sweep",
+            "transit, matrices, sweep and optimise",
         ),
         (["--version", "now"], "--version takes no arguments"),
         (["help", "gear"], "'gear' is a group of the input: nocdyn help input gear"),
@@ -73,7 +73,7 @@ def one_line(text):
             ["help", "simulate"],
             "there is no help on 'simulate'; "
             "try 'run', 'check', 'equilibrium', 'modes', 'response', 'campbell', 'sensitivity', 'fit', 'orbit', 'transit', "
-            "'matrices', 'sweep', 'merge', 'plot', 'report', 'fmu', 'import', 'verify', 'new', 'help' or 'input'",
+            "'matrices', 'sweep', 'optimise', 'merge', 'plot', 'report', 'fmu', 'import', 'verify', 'new', 'help' or 'input'",
         ),
         (["help", "input", "boddy"], "there is no topic or group 'boddy'; did you mean 'body'?\n"),
         (["help", "input", "torsionel"], "there is no topic or group 'torsionel'; did you mean 'torsional'?\n"),

@@ -143,6 +143,9 @@ ELEMENTS = {
             ("lognormal", "median = 2 log_deviation = 0.1 high = 9 distribution = 'lognormal'"),
         )
     },
+    "best choice": "&objective goal = 'maximise' quantity = 'omega_a' statistic = 'final' /\n"
+    "&objective goal = 'minimise' quantity = 'omega_b' statistic = 'max' scale = 2 /\n"
+    "&design target = 'body.a.inertia' low = 1 high = 2 step = 0.5 /\n&design target = 'body.b.inertia' values = 1, 2 /",
     "statistics": f"&sweep design = 'grid' /\n{VARY} count = 3 /\n&record quantity = 'omega_a' statistic = 'final', 'max', "
     "'min', 'max_abs', 'mean', 'rms', 'time_of_max', 'time_of_min', 'time_of_max_abs', 'settling_time' /",
     "modes": f"&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 /\n&sweep design = 'grid' /\n{VARY} count = 3 /\n"

@@ -134,7 +134,7 @@ class BareMachine:
     TOOLS = ("bash", "cat", "chmod", "dirname", "env", "mktemp", "rm", "tail", "cmake", "ninja", "g++", "python3")
     COMPILERS = ("gfortran", "mpifort", "mpirun")
     COMPILER = '#!/usr/bin/env bash\necho "/lib/${1#*=}"\n'
-    PACKAGES = "gfortran liblapack-dev libblas-dev libnetcdff-dev libopenmpi-dev openmpi-bin"
+    PACKAGES = "gfortran liblapack-dev libblas-dev libnetcdff-dev libnlopt-dev libopenmpi-dev openmpi-bin"
 
     def __init__(self, folder: Path):
         self.folder = folder

@@ -153,7 +153,8 @@ contains
           if (column == 0) cycle
           one = new_statistic(signals, column, statistic_max_abs, from)
           one%result = plan%results() + 1
-          call add_bound(bounds, signals(column)%name // ', largest magnitude', derating(group) * group%number(trim(peak_keys(k))))
+          call add_bound(bounds, signals(column)%name // ', largest magnitude', &
+                         derating(group) * group%number(trim(peak_keys(k))))
         end associate
         allocate (statistics(size(plan%statistics) + 1))
         statistics(:size(plan%statistics)) = plan%statistics

@@ -93,8 +93,8 @@ contains
       end do
       do i = 1, size(self%numbers)
         associate (one => self%numbers(i))
-          call report%append_line('  ' // padded(one%path, width) // cell(one%before) // cell(best%values(i)) // cell(one%low) // &
-                                  cell(one%high) // '  ' // one%unit)
+          line = '  ' // padded(one%path, width) // cell(one%before) // cell(best%values(i))
+          call report%append_line(line // cell(one%low) // cell(one%high) // '  ' // one%unit)
         end associate
       end do
       call report%append_line('  ' // padded('objective', width) // cell('before') // cell('best') // cell('goal'))

@@ -52,7 +52,7 @@ contains
     type(input_t), intent(in) :: input
     type(design_number_t), intent(in) :: numbers(:)
     type(design_size_t), intent(in) :: sizes(:)
-    integer, intent(in) :: starts                      !! 0: as many as usual
+    integer, intent(in) :: starts                      !! as many as usual if 0
     type(optimum_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
     type(design_problem_t) :: problem

@@ -58,13 +58,13 @@ module nocdyn_minimax
   end interface
 
   !> What the functions of NLopt know: the problem, and the last point with its gradients.
-  type :: search_t
+  type :: worst_search_t
     class(worst_problem_t), pointer :: problem => null()
     real(wp) :: scale = 1.0_wp               ! of the goals
     type(worst_point_t) :: here, best
     real(wp), allocatable :: slope(:, :)     ! [variables, goals and limits]
     integer :: evaluations = 0
-  end type search_t
+  end type worst_search_t
 
   real(wp), parameter :: difference = 1.0e-4_wp        ! of gradients
   real(wp), parameter :: far = 1.0e3_wp                ! a goal where there is none, over the scale
@@ -104,7 +104,7 @@ contains
     integer, intent(inout) :: evaluations   !! counted on
     integer, parameter :: most_rounds = 12
     real(wp), parameter :: gain = 1.0e-6_wp, poll_steps(*) = [1.0e-2_wp, 1.0e-3_wp]
-    type(search_t), target :: search
+    type(worst_search_t), target :: search
     real(wp) :: before
     integer :: round, step
     logical :: has_changed, has_found
@@ -136,7 +136,7 @@ contains
 
   !> Goes downhill from the best point.
   subroutine descend(search)
-    type(search_t), target, intent(inout) :: search
+    type(worst_search_t), target, intent(inout) :: search
     integer, parameter :: most_evaluations = 40
     real(c_double), parameter :: step = 1.0e-8_c_double, fall = 1.0e-10_c_double, tolerance = 1.0e-9_c_double
     integer(c_int) :: status
@@ -199,7 +199,7 @@ contains
     real(c_double), intent(out) :: values(m)
     real(c_double), intent(in) :: x(n)
     type(c_ptr), value, intent(in) :: gradient, data
-    type(search_t), pointer :: search
+    type(worst_search_t), pointer :: search
     real(c_double), pointer :: slope(:, :)
 
     call c_f_pointer(data, search)
@@ -223,7 +223,7 @@ contains
 
   !> Finds the functions and their gradients at a point, unless they are known.
   subroutine differentiate(search, x)
-    type(search_t), intent(inout) :: search
+    type(worst_search_t), intent(inout) :: search
     real(wp), intent(in) :: x(:)
     type(worst_point_t), allocatable :: points(:)
     real(wp) :: around(size(x), 0:2 * size(x))
@@ -259,7 +259,7 @@ contains
 
   !> Looks at steps of one size along each variable.
   subroutine poll(search, step, has_found)
-    type(search_t), intent(inout) :: search
+    type(worst_search_t), intent(inout) :: search
     real(wp), intent(in) :: step
     logical, intent(out) :: has_found   !! a better point, by more than rounding
     real(wp), parameter :: least = 1.0e-9_wp
