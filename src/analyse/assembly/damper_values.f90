@@ -51,11 +51,11 @@ contains
     real(wp) :: stiffness, tuned   ! [N m/rad], [rad/s]
 
     if (part%kind == 'body') then
-      call set(part, 'inertia', damper%number('ring_inertia'))
+      call part%set_number('inertia', damper%number('ring_inertia'))
       return
     end if
     if (damper%text('kind') == 'viscous') then
-      call set(part, 'damping', viscous_damping(damper))
+      call part%set_number('damping', viscous_damping(damper))
       return
     end if
     associate (inertia => damper%number('ring_inertia'))
@@ -67,17 +67,17 @@ contains
         stiffness = inertia * tuned**2
       end if
     end associate
-    call set(part, 'stiffness', stiffness)
+    call part%set_number('stiffness', stiffness)
     if (damper%text('kind') == 'rubber') then
-      call set(part, 'relative_damping', damper%number('relative_damping', &
+      call part%set_number('relative_damping', damper%number('relative_damping', &
                                                        absent=2.0_wp * pi * damper%number('loss_factor', absent=0.0_wp)))
-      call set(part, 'damping_frequency', damper%number('damping_frequency', absent=tuned))
+      call part%set_number('damping_frequency', damper%number('damping_frequency', absent=tuned))
     else if (damper%has_value('damping')) then
-      call set(part, 'damping', damper%number('damping'))
+      call part%set_number('damping', damper%number('damping'))
     else if (damper%has_value('loss_factor')) then
-      call set(part, 'damping', damper%number('loss_factor') * stiffness / tuned)
+      call part%set_number('damping', damper%number('loss_factor') * stiffness / tuned)
     else
-      call set(part, 'damping', 2.0_wp * damper%number('damping_ratio') * stiffness / tuned)
+      call part%set_number('damping', 2.0_wp * damper%number('damping_ratio') * stiffness / tuned)
     end if
   end subroutine derive_damper
 
@@ -108,13 +108,5 @@ contains
 
     damping = 2.0_wp * pi * viscosity * (width * sum(radius**3 / gap) + (radius(2)**4 - radius(1)**4) / (2.0_wp * side_gap))
   end function gap_damping
-
-  pure subroutine set(group, key, value)
-    type(group_t), intent(inout) :: group
-    character(len=*), intent(in) :: key
-    real(wp), intent(in) :: value   !! in the unit of the schema
-
-    group%values(group%key_position(key))%numbers = [value]
-  end subroutine set
 
 end module nocdyn_damper_values

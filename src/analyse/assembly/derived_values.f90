@@ -76,7 +76,7 @@ contains
     do g = 1, size(input%groups)
       if (input%groups(g)%kind /= 'body' .or. input%groups(g)%name /= name) cycle
       associate (body => input%groups(g))
-        call set(body, 'inertia', body%number('inertia') + inertia / (1.0_wp + body%number('entrained', absent=0.0_wp)))
+        call body%set_number('inertia', body%number('inertia') + inertia / (1.0_wp + body%number('entrained', absent=0.0_wp)))
       end associate
     end do
   end subroutine add_inertia
@@ -89,26 +89,17 @@ contains
     law = new_rubber_law(group)
     if (group%has_value('condition')) then
       if (group%text('condition') == 'warm') then
-        if (group%has_value('warm_stiffness')) call set(group, 'stiffness', group%number('warm_stiffness'))
+        if (group%has_value('warm_stiffness')) call group%set_number('stiffness', group%number('warm_stiffness'))
         if (group%has_value('warm_damping')) then
-          call set(group, 'relative_damping', group%number('warm_damping'))
+          call group%set_number('relative_damping', group%number('warm_damping'))
           if (group%has_value('magnifier')) deallocate (group%values(group%key_position('magnifier'))%numbers)
         end if
       end if
     end if
-    call set(group, 'stiffness', law%base(1) * group%number('stiffness', absent=0.0_wp))
-    if (group%has_value('relative_damping')) call set(group, 'relative_damping', law%base(2) * group%number('relative_damping'))
-    if (group%has_value('magnifier')) call set(group, 'magnifier', group%number('magnifier') / law%base(2))
+    call group%set_number('stiffness', law%base(1) * group%number('stiffness', absent=0.0_wp))
+    if (group%has_value('relative_damping')) call group%set_number('relative_damping', law%base(2) * group%number('relative_damping'))
+    if (group%has_value('magnifier')) call group%set_number('magnifier', group%number('magnifier') / law%base(2))
   end subroutine derive_rubber
-
-  !> Sets the number of a key.
-  pure subroutine set(group, key, value)
-    type(group_t), intent(inout) :: group
-    character(len=*), intent(in) :: key
-    real(wp), intent(in) :: value   !! in the unit of the schema
-
-    group%values(group%key_position(key))%numbers = [value]
-  end subroutine set
 
   !> Lists the laws of the rubber couplings of a machine.
   subroutine add_rubber_laws(input, machine)

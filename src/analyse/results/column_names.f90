@@ -4,11 +4,11 @@ module nocdyn_column_names
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
   use nocdyn_machine, only: machine_t
-  use nocdyn_near_words, only: nearest_word
+  use nocdyn_near_words, only: near_match
   use nocdyn_output_units, only: output_units, turn_units
   use nocdyn_patterns, only: matches
   use nocdyn_signals, only: former_name, label_signals, list_signals, signal_t
-  use nocdyn_text, only: append, joined, quoted, string_t, to_text
+  use nocdyn_text, only: append, append_new, joined, quoted, string_t, to_text
   implicit none (type, external)
   private
 
@@ -175,15 +175,6 @@ contains
     if (unit /= '') label = name // ' [' // unit // ']'
   end function with_unit
 
-  !> Appends a text that is not yet in a list.
-  pure subroutine append_new(list, text)
-    type(string_t), allocatable, intent(inout) :: list(:)
-    character(len=*), intent(in) :: text
-    integer :: i
-
-    if (.not. any([(list(i)%text == text, i=1, size(list))])) call append(list, text)
-  end subroutine append_new
-
   !> Why a name that is no signal may have been written, e.g. "; did you mean 'omega_motor'?".
   subroutine explain_no_signal(name, signals, text)
     character(len=*), intent(in) :: name
@@ -201,18 +192,6 @@ contains
     if (index(name, '[') > 0) text = near_match(name, labels)
     if (text == '') text = ', which has ' // related_names(name(:index(name // ' [', ' [') - 1), signals, names)
   end subroutine explain_no_signal
-
-  !> E.g. "; did you mean 'omega_motor'?", '' if no name is similar.
-  pure function near_match(name, candidates) result(text)
-    character(len=*), intent(in) :: name
-    type(string_t), intent(in) :: candidates(:)
-    character(len=:), allocatable :: text
-    integer :: nearest
-
-    text = ''
-    nearest = nearest_word(name, candidates)
-    if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
-  end function near_match
 
   !> The signals of the element or with the symbol that a name may mean; if there are none, the first ones of all.
   pure function related_names(name, signals, names) result(text)

@@ -16,7 +16,7 @@ module nocdyn_equilibrium
   use nocdyn_reduced, only: reduced_t
   use nocdyn_resting_joints, only: list_resting_sets, new_resting_joints, resting_joints_t, slips_where_it_cannot
   use nocdyn_static_twists, only: find_twists, twist_problem_t, undetermined_elements
-  use nocdyn_text, only: append, joined, string_t, to_text
+  use nocdyn_text, only: append, append_new, joined, string_t, to_text
   use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   implicit none (type, external)
   private
@@ -307,15 +307,6 @@ contains
                            joined(element_names(balance%formulation%machine, undetermined), ', ', most_names) // &
                            ' one near the start is kept')
   end subroutine add_range_notes
-
-  !> Appends a note, unless the list has it.
-  subroutine append_new(notes, text)
-    type(string_t), allocatable, intent(inout) :: notes(:)
-    character(len=*), intent(in) :: text
-    integer :: i
-
-    if (.not. any([(notes(i)%text == text, i=1, size(notes))])) call append(notes, text)
-  end subroutine append_new
 
   !> Advances to the next combination; false after the last one.
   logical function advance(blocks, choice)

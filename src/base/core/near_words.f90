@@ -1,10 +1,10 @@
 !> Near matches of misspelt names.
 module nocdyn_near_words
-  use nocdyn_text, only: lower_case, string_t
+  use nocdyn_text, only: lower_case, quoted, string_t
   implicit none (type, external)
   private
 
-  public :: nearest_word
+  public :: near_match, nearest_word
 
   integer, parameter :: longest_word = 256   ! that is compared with others
 
@@ -28,6 +28,18 @@ contains
       end if
     end do
   end function nearest_word
+
+  !> E.g. "; did you mean 'omega_motor'?", '' if no candidate is near.
+  pure function near_match(word, candidates) result(text)
+    character(len=*), intent(in) :: word
+    type(string_t), intent(in) :: candidates(:)
+    character(len=:), allocatable :: text
+    integer :: nearest
+
+    text = ''
+    nearest = nearest_word(word, candidates)
+    if (nearest > 0) text = '; did you mean ' // quoted(candidates(nearest)%text) // '?'
+  end function near_match
 
   !> Optimal string alignment distance, which counts insertions, deletions, substitutions and swaps of neighbours.
   pure function edit_distance(a, b) result(distance)

@@ -7,7 +7,7 @@ module nocdyn_text
   private
 
   public :: to_text, rounded_text, write_number, lower_case, quoted, joined, listed, counted, shortened, &
-    shown_path, split_lines, strings, append, selected, is_too_long
+    shown_path, split_lines, strings, append, append_new, selected, is_too_long
 
   integer, parameter :: most_characters = 80   ! of a text in a message
   integer, parameter :: head = 30, tail = 46   ! characters of a path that is cut
@@ -372,6 +372,15 @@ contains
     longer(size(longer))%text = text
     call move_alloc(longer, list)
   end subroutine append
+
+  !> Appends a text that is not yet in a list.
+  pure subroutine append_new(list, text)
+    type(string_t), allocatable, intent(inout) :: list(:)
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    if (.not. any([(list(i)%text == text, i=1, size(list))])) call append(list, text)
+  end subroutine append_new
 
   !> Whether the operating system has no folder with such a path.
   pure logical function is_too_long(path)

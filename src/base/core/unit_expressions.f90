@@ -4,7 +4,7 @@
 !> factor behind it stands in parentheses; powers are 'm2', 'm^2', 'm**2' or 's-1'.
 module nocdyn_unit_expressions
   use nocdyn_kinds, only: wp
-  use nocdyn_near_words, only: nearest_word
+  use nocdyn_near_words, only: near_match
   use nocdyn_printable, only: utf_8_length
   use nocdyn_text, only: append, quoted, shortened, string_t, to_text
   use nocdyn_units, only: ambiguous_units, base_units, quantity_names, unit_prefixes, unit_spellings, unit_symbols, usual_units
@@ -405,8 +405,7 @@ contains
       call append(known, trim(unit_spellings(i)%name))
     end do
     message = quoted(shortened(word)) // ' is no unit'
-    i = nearest_word(word, known)
-    if (i > 0) message = message // '; did you mean ' // quoted(known(i)%text) // '?'
+    message = message // near_match(word, known)
   end function unknown_message
 
 end module nocdyn_unit_expressions

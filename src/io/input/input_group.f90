@@ -42,6 +42,7 @@ module nocdyn_input_group
     procedure :: is_given        !! set by the user
     procedure :: has_value       !! set by the user or by default
     procedure :: key_position    !! index in `values`
+    procedure :: set_number
   end type group_t
 
 contains
@@ -185,6 +186,15 @@ contains
 
     has_value = self%values(self%key_position(key))%has_any()
   end function has_value
+
+  !> Sets the only number of a key.
+  pure subroutine set_number(self, key, value)
+    class(group_t), intent(inout) :: self
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: value   !! in the unit of the schema
+
+    self%values(self%key_position(key))%numbers = [value]
+  end subroutine set_number
 
   !> Index of a key in `values`.
   pure integer function key_position(self, key)

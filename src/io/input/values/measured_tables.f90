@@ -4,7 +4,7 @@ module nocdyn_measured_tables
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_input, only: group_t, value_t
   use nocdyn_kinds, only: wp
-  use nocdyn_near_words, only: nearest_word
+  use nocdyn_near_words, only: near_match
   use nocdyn_schema, only: first_key, key_rules
   use nocdyn_text, only: append, quoted, shortened, string_t
   use nocdyn_unit_expressions, only: find_conversion, unit_conversion_t
@@ -38,8 +38,7 @@ contains
     integer, intent(out) :: m
     type(diagnostics_t), intent(inout) :: diagnostics
     type(string_t), allocatable :: names(:)
-    character(len=:), allocatable :: hint, wanted
-    integer :: near
+    character(len=:), allocatable :: wanted
 
     allocate (names(0))
     wanted = groups(g)%text('measurement')
@@ -50,10 +49,7 @@ contains
     end do
     if (m > size(groups)) then
       m = 0
-      hint = ''
-      near = nearest_word(wanted, names)
-      if (near > 0) hint = '; did you mean ' // quoted(names(near)%text) // '?'
-      call report(groups(g), g, 'there is no &measurement ' // quoted(shortened(wanted)) // hint, diagnostics)
+      call report(groups(g), g, 'there is no &measurement ' // quoted(shortened(wanted)) // near_match(wanted, names), diagnostics)
       return
     end if
     if (groups(m)%text('kind') /= 'series') then

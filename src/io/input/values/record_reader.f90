@@ -6,7 +6,7 @@ module nocdyn_record_reader
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_input, only: group_t, value_t
   use nocdyn_kinds, only: wp
-  use nocdyn_near_words, only: nearest_word
+  use nocdyn_near_words, only: near_match
   use nocdyn_raw_group, only: raw_group_t
   use nocdyn_schema_rules, only: anything, size_limit
   use nocdyn_text, only: append, joined, quoted, shortened, shown_path, string_t, to_text
@@ -95,8 +95,7 @@ contains
     subroutine find(item, absent)
       integer, intent(in) :: item     !! of `wanted`
       integer, intent(in) :: absent   !! the column if none is named
-      character(len=:), allocatable :: hint, key, name
-      integer :: nearest
+      character(len=:), allocatable :: key, name
 
       key = trim(wanted(item)%key)
       columns(item) = absent
@@ -113,12 +112,9 @@ contains
         call report(key, 'there is no column ' // quoted(shortened(name)) // ' in ' // shown_path(path) // &
                     ', which has no headings; allowed: numbers from 1 to ' // to_text(table%columns), exit_input)
       else
-        hint = ''
-        nearest = nearest_word(name, table%headings)
-        if (nearest > 0) hint = '; did you mean ' // quoted(table%headings(nearest)%text) // '?'
         call report(key, 'there is no single column ' // quoted(shortened(name)) // ' in ' // shown_path(path) // ':' // &
-                    to_text(table%heading_line) // '; allowed: ' // joined(table%headings, ', ') // ', or a number' // hint, &
-                    exit_input)
+                    to_text(table%heading_line) // '; allowed: ' // joined(table%headings, ', ') // ', or a number' // &
+                    near_match(name, table%headings), exit_input)
       end if
       columns(item) = 1   ! it is reported
     end subroutine find
