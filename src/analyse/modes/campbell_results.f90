@@ -21,6 +21,8 @@ module nocdyn_campbell_results
   implicit none (type, external)
   private
 
+  public :: line_name
+
   type, extends(analysis_t), public :: campbell_results_t
     type(campbell_t), private :: campbell
     character(len=:), allocatable, private :: body   !! whose speed is held

@@ -11,11 +11,13 @@ module nocdyn_sweep_results
   use nocdyn_input_text, only: input_text
   use nocdyn_journal_chunks, only: chunk_cursor_t
   use nocdyn_kinds, only: wp
+  use nocdyn_nominal_curves, only: find_nominal_curves, nominal_curves_t
   use nocdyn_order_statistics, only: find_order_statistics
   use nocdyn_output_file, only: write_file
   use nocdyn_posix, only: is_interrupted, remove_file
   use nocdyn_run_files, only: input_file, remove_run, run_to_files, summary_file
   use nocdyn_run_summary, only: run_summary_t
+  use nocdyn_sweep_bands, only: bands_file, new_bands
   use nocdyn_sweep_chunk, only: chunk_t, status_refused
   use nocdyn_sweep_netcdf, only: write_sweep_netcdf
   use nocdyn_sweep_header, only: sweep_netcdf_name, sweep_header_t
@@ -71,15 +73,37 @@ contains
         end associate
       end do
     end if
+    if (.not. allocated(error)) call write_bands(plan%input, folder, journals(1)%header, summary, error)
     if (.not. allocated(error) .and. arguments%is_given('--csv')) call write_sweep_csv(folder, journals, error)
     if (.not. allocated(error)) call write_trajectories(plan, folder, journals, arguments, summary%without_trajectory, error)
     if (.not. allocated(error)) call write_file(folder, input_file, input_text(plan%input), error)
-    if (.not. allocated(error)) call write_file(folder, columns_file, sweep_columns_json(journals(1)%header), error)
+    if (.not. allocated(error)) call write_file(folder, columns_file, sweep_columns_json(journals(1)%header, summary), &
+                                              error)
     call system_clock(now)
     if (allocated(summary%effort)) summary%effort%writing_time = real(now - began, wp) / real(rate, wp)
     if (.not. allocated(error)) call write_file(folder, summary_file, sweep_json(plan%input, journals(1)%header, summary), error)
     if (summary%done == 0 .and. .not. allocated(error)) call find_first_reason(journals, summary%first_reason, error)
   end subroutine write_results
+
+  !> Writes the bands of curves, or removes those of an earlier sweep.
+  subroutine write_bands(input, folder, header, summary, error)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: folder
+    type(sweep_header_t), intent(in) :: header
+    type(sweep_summary_t), intent(inout) :: summary   !! with the order statistics
+    type(error_t), allocatable, intent(out) :: error
+    type(nominal_curves_t) :: nominal
+
+    if (header%axis%points_in_use() == 0 .or. summary%done == 0) then
+      call remove_file(folder // '/' // bands_file)
+      return
+    end if
+    call find_nominal_curves(input, nominal, error)
+    if (allocated(error)) return
+    allocate (summary%bands)
+    call new_bands(header, nominal, summary%statistics, summary%bands)
+    call summary%bands%write_table(folder, error)
+  end subroutine write_bands
 
   !> Prints the summary. A sweep without any variant done is a failure.
   subroutine print_results(plan, folder, header, arguments, summary, code)

@@ -1,5 +1,6 @@
 !> Tables of comma-separated values: a header line, then rows of numbers that read back as the same values.
 module nocdyn_csv
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_printable, only: as_utf_8
@@ -7,7 +8,7 @@ module nocdyn_csv
   implicit none (type, external)
   private
 
-  public :: text_cell, write_header, write_row
+  public :: put_known, text_cell, write_header, write_row
 
 contains
 
@@ -49,5 +50,28 @@ contains
     call file%put_numbers(values(2:), ',')
     call file%put(new_line('a'))
   end subroutine write_row
+
+  !> Writes cells after others; those of numbers that are not known are empty.
+  subroutine put_known(file, values)
+    type(output_file_t), intent(inout) :: file
+    real(wp), intent(in) :: values(:)   !! NaN: not known
+    integer :: first, last
+
+    first = 1
+    do while (first <= size(values))
+      if (ieee_is_nan(values(first))) then
+        call file%put(',')
+        first = first + 1
+        cycle
+      end if
+      last = first
+      do while (last < size(values))
+        if (ieee_is_nan(values(last + 1))) exit
+        last = last + 1
+      end do
+      call file%put_numbers(values(first:last), ',')
+      first = last + 1
+    end do
+  end subroutine put_known
 
 end module nocdyn_csv

@@ -8,7 +8,7 @@ module nocdyn_sweep_netcdf
   use nocdyn_kinds, only: wp
   use nocdyn_netcdf_file, only: check, create, define, netcdf_file_t, new_name, put_text
   use nocdyn_sweep_chunk, only: chunk_t, status_done, status_words
-  use nocdyn_sweep_header, only: stored_quantity_t, sweep_netcdf_name
+  use nocdyn_sweep_header, only: curve_axis_t, stored_quantity_t, sweep_netcdf_name
   use nocdyn_sweep_journal, only: sweep_journal_t
   use nocdyn_text, only: strings
   implicit none (type, external)
@@ -22,9 +22,11 @@ module nocdyn_sweep_netcdf
   integer, parameter :: megabyte = 2**20      ! the library's unit for the size of caches
 
   type, extends(netcdf_file_t) :: sweep_file_t
-    integer :: variant_dimension = 0, failure_dimension = 0, reason_dimension = 0
+    integer :: variant_dimension = 0, failure_dimension = 0, reason_dimension = 0, axis_dimension = 0
     integer :: variant = 0, status = 0, steps = 0, failed_variant = 0, reason = 0   ! numbers of variables
-    integer, allocatable :: parameters(:), results(:)
+    integer :: axis = 0
+    integer, allocatable :: parameters(:), results(:)   ! all points of a curve have one variable
+    integer, allocatable :: points(:)                   ! of the results, 0: of no curve
     integer :: written = 0, failures = 0                                             ! rows
   end type sweep_file_t
 
@@ -66,7 +68,10 @@ contains
         call check(file, nf90_def_dim(file%id, 'reason_length', longest, file%reason_dimension))
         call define(file, 'variant', nf90_int, [file%variant_dimension], 'number of the variant', file%variant)
         call define_quantities(file, header%parameters, 'parameter', file%parameters)
+        if (header%axis%points_in_use() > 0) call define_axis(file, header%axis)
         call define_quantities(file, header%results, 'result', file%results)
+        allocate (file%points(size(header%results)))
+        file%points = header%results%point
       end associate
       ! defines the variables for the status of the variants and for the reasons of those that are not done
       call define(file, 'status', nf90_byte, [file%variant_dimension], 'how the variant ended', file%status)
@@ -91,6 +96,11 @@ contains
       end associate
       if (.not. allocated(file%failure)) call check(file, nf90_enddef(file%id))
     end if
+    associate (axis => journals(1)%header%axis)
+      if (axis%points_in_use() > 0 .and. .not. allocated(file%failure)) then
+        call check(file, nf90_put_var(file%id, file%axis, axis%points))
+      end if
+    end associate
     if (.not. allocated(file%failure)) call write_rows(file, journals, error)
     if (allocated(error)) then
       call file%discard()
@@ -99,21 +109,46 @@ contains
     end if
   end subroutine write_sweep_netcdf
 
-  !> Defines a variable for each quantity. Its name is the label as far as NetCDF allows; the attribute `label` has all of it.
+  !> Defines the coordinate that curves are over.
+  subroutine define_axis(file, axis)
+    type(sweep_file_t), intent(inout) :: file
+    type(curve_axis_t), intent(in) :: axis
+    character(len=:), allocatable :: name
+
+    name = new_name(file, axis%label)
+    call check(file, nf90_def_dim(file%id, name, size(axis%points), file%axis_dimension))
+    call define(file, name, nf90_double, [file%axis_dimension], 'what curves are over', file%axis)
+    call put_text(file, file%axis, 'units', axis%unit)
+    call put_text(file, file%axis, 'label', axis%label)
+    call put_text(file, file%axis, 'role', 'axis')
+  end subroutine define_axis
+
+  !> Defines a variable for each quantity, and for each curve. Its name is the label as far as NetCDF allows; the attribute `label`
+  !> has all of it.
   subroutine define_quantities(file, quantities, role, variables)
     type(sweep_file_t), intent(inout) :: file
     type(stored_quantity_t), intent(in) :: quantities(:)
     character(len=*), intent(in) :: role
     integer, allocatable, intent(out) :: variables(:)
-    character(len=:), allocatable :: name
+    character(len=:), allocatable :: label
     integer :: i
 
     allocate (variables(size(quantities)))
     do i = 1, size(quantities)
-      name = new_name(file, quantities(i)%label)
-      call define(file, name, nf90_double, [file%variant_dimension], quantities(i)%long_name, variables(i))
+      if (quantities(i)%point > 1) then
+        variables(i) = variables(i - 1)
+        cycle
+      end if
+      label = quantities(i)%label
+      if (quantities(i)%point > 0) then
+        label = quantities(i)%curve()
+        call define(file, new_name(file, label), nf90_double, [file%variant_dimension, file%axis_dimension], &
+                    quantities(i)%long_name, variables(i))
+      else
+        call define(file, new_name(file, label), nf90_double, [file%variant_dimension], quantities(i)%long_name, variables(i))
+      end if
       if (quantities(i)%unit /= '') call put_text(file, variables(i), 'units', quantities(i)%unit)
-      call put_text(file, variables(i), 'label', quantities(i)%label)
+      call put_text(file, variables(i), 'label', label)
       call put_text(file, variables(i), 'role', role)
     end do
   end subroutine define_quantities
@@ -165,7 +200,12 @@ contains
       call check(file, nf90_put_var(file%id, file%parameters(i), rows%parameters(:rows%count, i), first))
     end do
     do i = 1, size(file%results)
-      call check(file, nf90_put_var(file%id, file%results(i), rows%results(:rows%count, i), first))
+      if (file%points(i) == 0) then
+        call check(file, nf90_put_var(file%id, file%results(i), rows%results(:rows%count, i), first))
+      else
+        call check(file, nf90_put_var(file%id, file%results(i), rows%results(:rows%count, i), [first, file%points(i)], &
+                                      [rows%count, 1]))
+      end if
     end do
     call check(file, nf90_put_var(file%id, file%status, int(rows%status(:rows%count), int8), first))
     call check(file, nf90_put_var(file%id, file%steps, rows%steps(:rows%count), first))

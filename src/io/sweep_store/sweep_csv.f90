@@ -1,6 +1,6 @@
 !> The file sweep.csv: the numbers of sweep.nc as text.
 module nocdyn_sweep_csv
-  use nocdyn_csv, only: write_header
+  use nocdyn_csv, only: put_known, write_header
   use nocdyn_errors, only: error_t
   use nocdyn_journal_chunks, only: check_sweep, chunk_cursor_t
   use nocdyn_output_file, only: output_file_t
@@ -42,7 +42,7 @@ contains
         call file%put(to_text(chunk%first - 1 + i))
         call file%put_numbers(chunk%parameters(:, i), ',')
         if (is_done) then
-          call file%put_numbers(chunk%results(:, i), ',')
+          call put_known(file, chunk%results(:, i))
         else
           call file%put(repeat(',', size(chunk%results, 1)))
         end if

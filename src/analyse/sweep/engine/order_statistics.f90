@@ -1,4 +1,5 @@
-!> Minimum, maximum, median, 5 % and 95 % quantiles of every result of a sweep, in memory that does not grow beyond megabytes.
+!> Minimum, maximum, median, quartiles, 5 % and 95 % quantiles of every result of a sweep, in memory that does not grow beyond
+!> megabytes.
 !>
 !> Radix selection: the bits of a number are rearranged so that they sort like unsigned integers. A few passes over the
 !> journals, or over the chunks of a small sweep that the first pass keeps, find these bits digit by digit, from the leading
@@ -20,19 +21,22 @@ module nocdyn_order_statistics
   type, public :: order_statistics_t
     integer :: count = 0   !! variants that have the result
     real(wp) :: minimum = 0.0_wp, low = 0.0_wp, median = 0.0_wp, high = 0.0_wp, maximum = 0.0_wp
+    real(wp) :: lower_quartile = 0.0_wp, upper_quartile = 0.0_wp
     integer :: variant_of_minimum = 0, variant_of_maximum = 0   !! the lowest number of several
   end type order_statistics_t
 
-  real(wp), parameter :: quantiles(3) = [0.05_wp, 0.5_wp, 0.95_wp]
+  real(wp), parameter :: quantiles(5) = [0.05_wp, 0.25_wp, 0.5_wp, 0.75_wp, 0.95_wp]
   integer, parameter :: wanted = 2 * size(quantiles)   ! both neighbours of each quantile
 
   integer, parameter :: million = 2**20
+  integer, parameter :: at_a_time = 100   ! results whose histograms are in memory, 30 MB
 
   ! the 64 bits of a number in five digits, the first of which has 12 bits
   integer, parameter :: digit_bits = 13, passes = 5, values_of_digit = 2**digit_bits
 
   !> The selection for one result.
   type :: selection_t
+    integer :: result = 0                        ! its number
     integer(int64) :: prefix(wanted) = 0         ! the bits of each wanted value that are known, leading ones
     integer :: rank(wanted) = 0                  ! of each wanted value among those with these bits, from 0
     integer :: group(wanted) = 1                 ! number of its prefix among the different ones
@@ -49,15 +53,10 @@ contains
     type(order_statistics_t), allocatable, intent(out) :: statistics(:)
     type(error_t), allocatable, intent(out) :: error
     integer, intent(in), optional :: most_kept   !! numbers of a sweep that is read once and kept; absent: a million
-    type(selection_t), allocatable :: selections(:)
     type(chunk_t), allocatable :: kept(:)
-    integer :: i, most, pass
-    real(wp) :: found(size(quantiles))
+    integer :: first, most
 
-    allocate (statistics(size(journals(1)%header%results)), selections(size(journals(1)%header%results)))
-    do i = 1, size(selections)
-      allocate (selections(i)%histogram(0:values_of_digit - 1, wanted))
-    end do
+    allocate (statistics(size(journals(1)%header%results)))
     most = million
     if (present(most_kept)) most = most_kept
     associate (header => journals(1)%header)
@@ -65,6 +64,27 @@ contains
         allocate (kept(sum(journals%entries)))
       end if
     end associate
+    do first = 1, size(statistics), at_a_time
+      call find_some(journals, kept, first, statistics(first:min(first + at_a_time - 1, size(statistics))), error)
+      if (allocated(error)) return
+    end do
+  end subroutine find_order_statistics
+
+  !> Computes them of some results.
+  subroutine find_some(journals, kept, first, statistics, error)
+    type(sweep_journal_t), intent(inout) :: journals(:)
+    type(chunk_t), allocatable, intent(inout) :: kept(:)   !! the chunks of a small sweep, after the first pass
+    integer, intent(in) :: first                           !! of these results
+    type(order_statistics_t), intent(inout) :: statistics(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(selection_t) :: selections(size(statistics))
+    integer :: i, pass
+    real(wp) :: found(size(quantiles))
+
+    do i = 1, size(selections)
+      selections(i)%result = first - 1 + i
+      allocate (selections(i)%histogram(0:values_of_digit - 1, wanted))
+    end do
     do pass = 1, passes
       call count_digits(journals, kept, pass, selections, statistics, error)
       if (allocated(error)) return
@@ -87,10 +107,12 @@ contains
                 (statistics(i)%count - 1) * quantiles)
       end if
       statistics(i)%low = found(1)
-      statistics(i)%median = found(2)
-      statistics(i)%high = found(3)
+      statistics(i)%lower_quartile = found(2)
+      statistics(i)%median = found(3)
+      statistics(i)%upper_quartile = found(4)
+      statistics(i)%high = found(5)
     end do
-  end subroutine find_order_statistics
+  end subroutine find_some
 
   !> One pass over the journals: histograms of one digit; the first pass also counts and finds extremes.
   subroutine count_digits(journals, kept, pass, selections, statistics, error)
@@ -104,9 +126,11 @@ contains
     integer :: i, j, k, number
 
     do i = 1, size(selections)
-      selections(i)%histogram = 0
+      selections(i)%histogram(:, :selections(i)%groups) = 0
     end do
-    if (pass > 1 .and. allocated(kept)) then
+    number = 0
+    if (allocated(kept)) number = count([(allocated(kept(k)%results), k=1, size(kept))])
+    if (number > 0) then
       do number = 1, size(kept)
         call count_results(kept(number), pass, selections, statistics)
       end do
@@ -133,8 +157,8 @@ contains
     integer :: i
 
     do i = 1, size(selections)
-      if (pass == 1) call update_extremes(chunk, i, statistics(i))
-      call count_chunk(chunk, i, digit_bits * (passes - pass), selections(i))
+      if (pass == 1) call update_extremes(chunk, selections(i)%result, statistics(i))
+      call count_chunk(chunk, digit_bits * (passes - pass), selections(i))
     end do
   end subroutine count_results
 
@@ -171,17 +195,16 @@ contains
   end function precedes
 
   !> Takes the digits of a chunk's values into the histograms of their prefixes.
-  pure subroutine count_chunk(chunk, result, shift, selection)
+  pure subroutine count_chunk(chunk, shift, selection)
     type(chunk_t), intent(in) :: chunk
-    integer, intent(in) :: result
     integer, intent(in) :: shift                      !! number of bits below the digit
     type(selection_t), intent(inout) :: selection
     integer(int64) :: bits, prefix
     integer :: digit, group, i
 
     do i = 1, chunk%count
-      if (chunk%status(i) /= status_done .or. ieee_is_nan(chunk%results(result, i))) cycle
-      bits = sortable_bits(chunk%results(result, i))
+      if (chunk%status(i) /= status_done .or. ieee_is_nan(chunk%results(selection%result, i))) cycle
+      bits = sortable_bits(chunk%results(selection%result, i))
       prefix = shiftr(bits, min(shift + digit_bits, 64))
       do group = 1, selection%groups
         if (prefix /= selection%prefix_of_group(group)) cycle

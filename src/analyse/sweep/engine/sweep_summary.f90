@@ -3,7 +3,8 @@ module nocdyn_sweep_summary
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
-  use nocdyn_sweep_header, only: fact_names, sweep_header_t, sweep_netcdf_name
+  use nocdyn_sweep_bands, only: bands_file, sweep_bands_t
+  use nocdyn_sweep_header, only: fact_names, stored_quantity_t, sweep_header_t, sweep_netcdf_name
   use nocdyn_order_statistics, only: order_statistics_t
   use nocdyn_run_settings, only: put_settings
   use nocdyn_table_text, only: append_table
@@ -30,6 +31,7 @@ module nocdyn_sweep_summary
     type(sweep_effort_t), allocatable :: effort              !! not allocated after a merge
     character(len=:), allocatable :: first_reason            !! why the first variant is not done; if no variant is
     integer, allocatable :: without_trajectory(:)            !! variants of which trajectories were requested
+    type(sweep_bands_t), allocatable :: bands                !! of curves, if some are kept
   end type sweep_summary_t
 
 contains
@@ -74,6 +76,7 @@ contains
     ! the order statistics of every result; none if no variant is done
     call json%open('statistics')
     do i = 1, merge(size(summary%statistics), 0, summary%done > 0)
+      if (header%results(i)%point > 0) cycle
       associate (found => summary%statistics(i))
         call json%open(header%results(i)%label)
         call json%put('unit', header%results(i)%unit)
@@ -88,6 +91,13 @@ contains
       end associate
     end do
     call json%close()
+    if (allocated(summary%bands)) then
+      call json%open('bands')
+      call json%put('file', bands_file)
+      call json%put('points', size(summary%bands%axis))
+      call json%put('curves', summary%bands%curves)
+      call json%close()
+    end if
     call json%close()
     text = json%text()
   end function sweep_json
@@ -101,8 +111,9 @@ contains
   end function rate
 
   !> The text of columns.json: what the results of the variants are.
-  function sweep_columns_json(header) result(text)
+  function sweep_columns_json(header, summary) result(text)
     type(sweep_header_t), intent(in) :: header
+    type(sweep_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(json_t) :: json
     integer :: i, k
@@ -110,11 +121,12 @@ contains
     call json%open()
     call json%open_list('columns')
     do i = 1, size(header%results)
+      if (header%results(i)%point > 1) cycle
       associate (one => header%results(i))
         call json%open()
         call json%put('label', label(header, i))
         call json%put('file', sweep_netcdf_name)
-        call json%put('name', one%label)
+        call json%put('name', name_of(header%results(i)))
         do k = 1, size(fact_names)
           call json%put(trim(fact_names(k)), one%facts(k)%text)
         end do
@@ -123,6 +135,7 @@ contains
         call json%close()
       end associate
     end do
+    if (allocated(summary%bands)) call summary%bands%put_columns(header, json)
     call json%close_list()
     call json%close()
     text = json%text()
@@ -136,22 +149,30 @@ contains
     character(len=*), parameter :: of_columns(*) = &
       [character(len=14) :: 'min', '5 %', 'median', '95 %', 'max', 'variant of min', 'variant of max']
     type(text_buffer_t) :: report
-    type(string_t) :: labels(size(header%results))
+    type(string_t) :: labels(count(header%results%point == 0))
     real(wp) :: values(size(labels), size(of_columns))
     character(len=32) :: headings(0:size(of_columns))
-    integer :: i
+    integer :: i, row
 
     if (header%title /= '') call report%append_line(header%title)
-    do i = 1, size(labels)
-      labels(i)%text = label(header, i)
+    row = 0
+    do i = 1, size(header%results)
+      if (header%results(i)%point > 0) cycle
+      row = row + 1
+      labels(row)%text = label(header, i)
       associate (found => summary%statistics(i))
-        values(i, :) = [found%minimum, found%low, found%median, found%high, found%maximum, &
+        values(row, :) = [found%minimum, found%low, found%median, found%high, found%maximum, &
                         real(found%variant_of_minimum, wp), real(found%variant_of_maximum, wp)]
       end associate
     end do
     headings(0) = 'result (' // counted(summary%done, 'variant', 'variants') // ')'
     headings(1:) = of_columns
-    call append_table(report, labels, values, headings, 0, 'more results in summary.json')
+    if (row > 0) call append_table(report, labels, values, headings, 0, 'more results in summary.json')
+    if (allocated(summary%bands)) then
+      call report%append_line('bands of ' // counted(size(summary%bands%curves), 'curve', 'curves') // ' at ' // &
+                              counted(size(summary%bands%axis), 'point', 'points') // ' of ' // summary%bands%axis_label // &
+                              ': ' // bands_file)
+    end if
     text = report%text()
   end function sweep_table
 
@@ -162,10 +183,19 @@ contains
     character(len=:), allocatable :: text
 
     associate (named => header%results(result_number))
-      text = named%label
+      text = name_of(named)
       if (named%unit /= '') text = text // ' [' // named%unit // ']'
     end associate
   end function label
+
+  !> The label of a result, or of the curve that it is a point of.
+  pure function name_of(quantity) result(name)
+    type(stored_quantity_t), intent(in) :: quantity
+    character(len=:), allocatable :: name
+
+    name = quantity%label
+    if (quantity%point > 0) name = quantity%curve()
+  end function name_of
 
   !> Lines on limits that no result is compared with, and on the variants that have no trajectory though it was requested; '' if
   !> there are neither.
@@ -203,7 +233,7 @@ contains
     do i = 1, size(input%groups)
       if (input%groups(i)%kind /= 'record') cycle
       associate (words => input%groups(i)%texts('statistic'))
-        compares = compares .or. any([(words(k)%text == 'ratio', k=1, size(words))])
+        compares = compares .or. any([(words(k)%text == 'ratio' .or. words(k)%text == 'curve', k=1, size(words))])
       end associate
     end do
   end function compares

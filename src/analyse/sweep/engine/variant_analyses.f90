@@ -1,6 +1,6 @@
 !> Modes, forced responses and other analyses of the variants of a sweep.
 module nocdyn_variant_analyses
-  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
   use nocdyn_analysis_results, only: analysis_result_t
   use nocdyn_errors, only: error_t, exit_failed
   use nocdyn_finite, only: is_finite
@@ -42,7 +42,7 @@ contains
     is_complete = .true.
   end subroutine analyse_chunk
 
-  !> Analyses one variant. A result that is not finite is a failure.
+  !> Analyses one variant. A result that is not finite is a failure; a curve may have gaps.
   subroutine analyse_one(plan, machines, chunk, index)
     type(sweep_plan_t), intent(in) :: plan
     type(variant_machines_t), intent(inout) :: machines
@@ -64,7 +64,7 @@ contains
       chunk%status(index) = merge(status_failed, status_refused, error%code == exit_failed)
       call move_alloc(error%message, chunk%reasons(index)%text)
     else
-      i = findloc(is_finite(results), .false., dim=1)
+      i = findloc(is_finite(results) .or. (plan%analyses%is_curve() .and. ieee_is_nan(results)), .false., dim=1)
       chunk%results(plan%analyses%result, index) = results
       if (i == 0) return
       chunk%status(index) = status_failed

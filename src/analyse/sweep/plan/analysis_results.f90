@@ -20,10 +20,13 @@ module nocdyn_analysis_results
 
   integer, parameter, public :: analysis_peak_frequency = 9  !! of a shaker, where the peak is
 
-  character(len=*), parameter, public :: analysis_names(9) = [character(len=15) :: 'frequency', 'damping_ratio', 'peak', &
-    'peak_speed', 'margin', 'ratio', 'crossing', 'crossing_margin', 'peak_frequency']
-  character(len=*), parameter, public :: analysis_owners(9) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
-    'response', 'response', 'mode', 'mode', 'response']   !! the key of &record that each belongs to
+  integer, parameter, public :: analysis_curve = 10          !! half range or amplitude at a speed of the grid of &response
+  integer, parameter, public :: analysis_mode_curve = 11     !! damped frequency there, as nocdyn campbell has it
+
+  character(len=*), parameter, public :: analysis_names(11) = [character(len=15) :: 'frequency', 'damping_ratio', 'peak', &
+    'peak_speed', 'margin', 'ratio', 'crossing', 'crossing_margin', 'peak_frequency', 'curve', 'curve']
+  character(len=*), parameter, public :: analysis_owners(11) = [character(len=8) :: 'mode', 'mode', 'response', 'response', &
+    'response', 'response', 'mode', 'mode', 'response', 'response', 'mode']   !! the key of &record that each belongs to
 
   integer, parameter, public :: of_path = -1, of_orbit = -2, of_verdict = -3   !! in place of a mode: results that a report has
 
@@ -41,6 +44,7 @@ module nocdyn_analysis_results
     character(len=:), allocatable :: command, path  !! of a number of a report: the command and the path in its report
     character(len=:), allocatable :: word           !! of an orbit: of `signal_words` or `branch_words`
     integer :: number = 1                           !! which one of several folds or jumps
+    integer :: point = 0                            !! of a curve: which of the speeds of &response; 0: no point of a curve
     type(signal_t) :: signal                        !! of the response
     character(len=:), allocatable :: quantity       !! element, or column of response.csv without its unit
     real(wp) :: order = 0.0_wp                      !! 0 stands for all orders together
@@ -50,7 +54,7 @@ module nocdyn_analysis_results
     integer :: in_unit = 0                          !! this unit as index of `units`, 0: SI
     character(len=:), allocatable :: long_name      !! a description
   contains
-    procedure :: is_reported
+    procedure :: is_reported, is_curve
   end type analysis_result_t
 
 contains
@@ -61,6 +65,13 @@ contains
 
     is_reported = self%mode < 0
   end function is_reported
+
+  !> Whether it is a point of a curve.
+  elemental logical function is_curve(self)
+    class(analysis_result_t), intent(in) :: self
+
+    is_curve = self%statistic == analysis_curve .or. self%statistic == analysis_mode_curve
+  end function is_curve
 
   !> Of an oscillating mode.
   subroutine new_mode_result(mode, order, statistic, self)
@@ -81,6 +92,9 @@ contains
     case (analysis_frequency)
       self%unit = 'Hz'
       self%long_name = 'frequency of mode ' // to_text(mode) // ' with damping'
+    case (analysis_mode_curve)
+      self%unit = 'Hz'
+      self%long_name = 'frequency of mode ' // to_text(mode) // ' with damping over the speed'
     case (analysis_damping_ratio)
       self%long_name = 'damping ratio of mode ' // to_text(mode)
     case (analysis_crossing)
@@ -188,6 +202,10 @@ contains
       self%unit = unit
       self%long_name = what // 'largest half range over the speed'
       if (order > 0) self%long_name = what // 'largest amplitude over the speed'
+    case (analysis_curve)
+      self%unit = unit
+      self%long_name = what // 'half range over the speed'
+      if (order > 0) self%long_name = what // 'amplitude over the speed'
     case (analysis_peak_speed)
       self%unit = 'rad/s'
       self%long_name = what // 'speed of the peak'

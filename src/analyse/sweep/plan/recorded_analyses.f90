@@ -1,9 +1,10 @@
 !> The results of modes and of the forced response that the groups &record ask for.
 module nocdyn_recorded_analyses
   use nocdyn_analyses, only: analysis_t
-  use nocdyn_analysis_results, only: analysis_crossing, analysis_crossing_margin, analysis_margin, analysis_names, &
-    analysis_owners, analysis_peak_frequency, analysis_peak_speed, analysis_ratio, analysis_result_t, new_mode_result, &
-    new_path_result, new_response_result
+  use nocdyn_analysis_results, only: analysis_crossing, analysis_crossing_margin, analysis_margin, analysis_mode_curve, &
+    analysis_names, analysis_owners, analysis_peak_frequency, analysis_peak_speed, analysis_ratio, analysis_result_t, &
+    new_mode_result, new_path_result, new_response_result
+  use nocdyn_campbell, only: campbell_t
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: error_t
   use nocdyn_excitation_lines, only: line_order
@@ -23,7 +24,7 @@ module nocdyn_recorded_analyses
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: append, quoted, string_t, to_text
   use nocdyn_units, only: unit_for, unit_hz, units
-  use nocdyn_variant_analysis, only: limited_kinds, matching_quantities, oscillating_modes, recorded_kinds
+  use nocdyn_variant_analysis, only: find_campbell, limited_kinds, matching_quantities, oscillating_modes, recorded_kinds
   implicit none (type, external)
   private
 
@@ -38,12 +39,15 @@ module nocdyn_recorded_analyses
     type(response_limit_t), allocatable :: limits(:)
     type(forced_response_t), allocatable :: response   !! with its lines, if the base machine has steady states
     integer :: oscillations = huge(1)                   !! number of its modes; unknown if it has no steady state
+    integer :: followed = huge(1)                       !! number of the modes over the speed; unknown without a diagram
     type(orbit_reader_t) :: orbit
     type(json_t) :: reports(size(analysis_words))       !! with their numbers, as far as paths ask for them
   contains
     procedure :: add_results
     procedure, private :: add_orbit, add_paths, check_mode, check_response, check_statistic
   end type analysis_reader_t
+
+  integer, parameter :: most_points = 10000   ! of a curve
 
 contains
 
@@ -57,6 +61,8 @@ contains
     type(error_t), allocatable :: failure
     type(forced_response_t), allocatable :: response
     type(mode_t), allocatable :: modes(:)
+    type(campbell_t) :: campbell
+    logical :: has_mode_curves, has_response
 
     self%kind = kind
     allocate (self%wanted_units, source=output_units(input))
@@ -67,9 +73,16 @@ contains
     end if
     if (asks_for(input, kind, 'path')) call read_reports(input, kind, self%reports)
     if (asks_for(input, kind, 'orbit')) call new_orbit_reader(input, machine, self%orbit, error)
-    if (allocated(error) .or. .not. asks_for(input, kind, 'response')) return
+    has_response = asks_for(input, kind, 'response')
+    has_mode_curves = asks_for_curves(input, kind, 'mode')
+    if (allocated(error) .or. .not. (has_response .or. has_mode_curves)) return
     call read_response_settings(input, machine, self%settings, error)
     if (allocated(error)) return
+    if (has_mode_curves) then
+      call find_campbell(input, campbell, failure)
+      if (.not. allocated(failure)) self%followed = campbell%modes%modes
+    end if
+    if (.not. has_response) return
     call list_moment_forms(machine, self%settings%body, self%quantities)
     call read_limits(input, self%quantities, self%limits, error)
     if (allocated(error)) return
@@ -89,6 +102,23 @@ contains
     asks_for_steady_modes = any([(input%groups(records(i))%has_value('mode') .and. &
                                   .not. input%groups(records(i))%has_value('order'), i=1, size(records))])
   end function asks_for_steady_modes
+
+  !> Whether a &record of a mode or a response asks for a curve.
+  logical function asks_for_curves(input, kind, owner)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: kind, owner   !! of the groups; their key
+    integer, allocatable :: records(:)
+    integer :: i, k
+
+    asks_for_curves = .false.
+    allocate (records, source=input%groups_named(kind))
+    do i = 1, size(records)
+      if (.not. input%groups(records(i))%has_value(owner)) cycle
+      associate (words => input%groups(records(i))%texts('statistic'))
+        asks_for_curves = asks_for_curves .or. any([(words(k)%text == 'curve', k=1, size(words))])
+      end associate
+    end do
+  end function asks_for_curves
 
   !> The reports of the base machine that paths name; without numbers if there is none.
   subroutine read_reports(input, kind, reports)
@@ -190,7 +220,6 @@ contains
     if (input%groups(record)%has_value('response')) owner = 'response'
     before = diagnostics%count
     if (owner == 'response') call self%check_response(input, record, diagnostics)
-    if (owner == 'mode') call self%check_mode(input, record, diagnostics)
     if (diagnostics%count > before) return
     words = input%groups(record)%texts('statistic')
     do i = 1, size(words)
@@ -202,6 +231,7 @@ contains
       end if
       if (owner == 'mode') then
         call check_order(input, record, k, diagnostics)
+        call self%check_mode(input, record, k, diagnostics)
         if (any(k == [analysis_crossing, analysis_crossing_margin])) then
           call new_mode_result(input%groups(record)%whole_number('mode'), &
                                input%groups(record)%number('order', absent=0.0_wp), k, one)
@@ -213,7 +243,13 @@ contains
         call self%check_statistic(input, record, k, diagnostics)
         call make_response_result(self, input, record, k, one)
       end if
-      call append_new(input, record, 'statistic', others, one, results, diagnostics)
+      if (one%is_curve() .and. size(self%settings%speeds) > most_points) then
+        call input%report(record, 'statistic', "statistic = 'curve' keeps a number at each of the " // &
+                          to_text(size(self%settings%speeds)) // ' ' // self%settings%axis%plural() // ' of &response; ' // &
+                          'allowed: at most ' // to_text(most_points), diagnostics)
+      else
+        call append_new(input, record, 'statistic', others, one, results, diagnostics, size(self%settings%speeds))
+      end if
     end do
   end subroutine add_results
 
@@ -250,18 +286,26 @@ contains
     end do
   end function statistics_of
 
-  !> Refuses a mode that the base machine does not have.
-  subroutine check_mode(self, input, record, diagnostics)
+  !> Refuses a mode that the base machine does not have, and curves of modes over what does not move them.
+  subroutine check_mode(self, input, record, statistic, diagnostics)
     class(analysis_reader_t), intent(in) :: self
     type(input_t), intent(in) :: input
-    integer, intent(in) :: record
+    integer, intent(in) :: record, statistic
     type(diagnostics_t), intent(inout) :: diagnostics
+    integer :: mode, modes
 
     if (input%groups(record)%has_value('order')) return   ! a mode that an order meets over the speed
-    if (input%groups(record)%whole_number('mode') <= self%oscillations) return
-    call input%report(record, 'mode', 'mode = ' // to_text(input%groups(record)%whole_number('mode')) // &
-                      ' is out of range; the machine of the input has ' // to_text(self%oscillations) // &
-                      ' oscillating modes about its steady state', diagnostics)
+    mode = input%groups(record)%whole_number('mode')
+    modes = merge(self%followed, self%oscillations, statistic == analysis_mode_curve)
+    if (statistic == analysis_mode_curve .and. self%settings%axis%is_frequency) then
+      call input%report(record, 'statistic', "statistic = 'curve' of a mode is over speeds, and &response is over the " // &
+                        'frequency of a shaker, which moves no mode', diagnostics)
+    else if (mode > modes) then
+      call input%report(record, 'mode', 'mode = ' // to_text(mode) // ' is out of range; the machine of the input has ' // &
+                        to_text(modes) // ' oscillating modes ' // &
+                        trim(merge('over its speed         ', 'about its steady state ', statistic == analysis_mode_curve)), &
+                        diagnostics)
+    end if
   end subroutine check_mode
 
   !> Refuses a response that the base machine does not have, and an order that nothing excites.
@@ -388,25 +432,34 @@ contains
     end if
   end subroutine check_order
 
-  !> Appends a result that is not recorded yet.
-  subroutine append_new(input, record, key, others, one, results, diagnostics)
+  !> Appends a result that is not recorded yet; of a curve one for each speed.
+  subroutine append_new(input, record, key, others, one, results, diagnostics, points)
     type(input_t), intent(in) :: input
     integer, intent(in) :: record, others     !! as in `add_results`
     character(len=*), intent(in) :: key       !! that asks for it
     type(analysis_result_t), intent(in) :: one
     type(analysis_result_t), allocatable, intent(inout) :: results(:)
     type(diagnostics_t), intent(inout) :: diagnostics
+    integer, intent(in), optional :: points   !! speeds of a curve
     type(analysis_result_t), allocatable :: longer(:)
-    integer :: k
+    integer :: before, k, new
 
-    if (any([(results(k)%label == one%label, k=1, size(results))])) then
+    before = size(results)
+    new = 1
+    if (one%is_curve()) new = points
+    if (any([(results(k)%label == one%label .or. results(k)%label == one%label // '_1', k=1, before)])) then
       call input%report(record, key, quoted(one%label) // ' is recorded already; allowed: once', diagnostics)
       return
     end if
-    allocate (longer(size(results) + 1))
-    longer(:size(results)) = results
-    longer(size(longer)) = one
-    longer(size(longer))%result = others + size(longer)
+    allocate (longer(before + new))
+    longer(:before) = results
+    do k = 1, new
+      longer(before + k) = one
+      longer(before + k)%result = others + before + k
+      if (.not. one%is_curve()) cycle
+      longer(before + k)%point = k
+      longer(before + k)%label = one%label // '_' // to_text(k)
+    end do
     call move_alloc(longer, results)
   end subroutine append_new
 

@@ -11,6 +11,7 @@ module nocdyn_sweep_plan
   use nocdyn_input_text, only: input_text
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
+  use nocdyn_output_units, only: output_units
   use nocdyn_output_times, only: check_output_times, table_bytes
   use nocdyn_recorded_analyses, only: analysis_reader_t, new_analysis_reader
   use nocdyn_recorded_quantities, only: check_quantities, note_former_records, read_recorded_quantities, time_span_t, &
@@ -22,10 +23,11 @@ module nocdyn_sweep_plan
   use nocdyn_signals, only: label_signals, list_signals, signal_t
   use nocdyn_statistics, only: statistic_names, statistic_t
   use nocdyn_sweep_design, only: find_varied, read_design
-  use nocdyn_sweep_header, only: stored_quantity_t, sweep_header_t
+  use nocdyn_sweep_header, only: curve_axis_t, stored_quantity_t, sweep_header_t
   use nocdyn_targets, only: set_targets, target_t
   use nocdyn_text, only: counted, string_t, to_text
   use nocdyn_text_sort, only: argsort, sorted_position
+  use nocdyn_units, only: from_si, unit_for, unit_hz, units
   use nocdyn_varied_numbers, only: find_varied_numbers, varied_numbers_t
   use nocdyn_version, only: compiler_text, version
   implicit none (type, external)
@@ -42,6 +44,7 @@ module nocdyn_sweep_plan
     type(varied_numbers_t) :: numbers                 !! that the design varies
     type(statistic_t), allocatable :: statistics(:)
     type(analysis_result_t), allocatable :: analyses(:)   !! results of modes and of the response
+    type(curve_axis_t) :: axis                        !! of curves
     integer, allocatable :: trajectories(:)           !! variants whose trajectories are written, ascending
     integer :: columns = 0                            !! of each trajectory
     type(string_t), allocatable :: notes(:)           !! for the user
@@ -75,6 +78,7 @@ contains
     if (allocated(plan%design)) variants = plan%design%variants
     call read_quantities('record', variants, plan, diagnostics, failure)
     if (.not. allocated(failure)) then
+      call refuse_varied_axis(plan, diagnostics)
       allocate (plan%trajectories, source=wanted_trajectories(input))
       if (plan%results() == 0 .and. diagnostics%count == 0) call input%report(sweeps(1), 'design', &
         'no number of the variants is kept; needed: a &record with quantity, fatigue, mode, response, orbit or path', diagnostics)
@@ -112,6 +116,7 @@ contains
     end if
     allocate (plan%design, source=list_design(origin))
     allocate (plan%trajectories(0))
+    call refuse_curves(input, kind, diagnostics)
     call read_quantities(kind, 1, plan, diagnostics, failure)
     call input%refuse(diagnostics, error)
     call add_error(error, failure)
@@ -134,7 +139,66 @@ contains
                                   plan%statistics, plan%analyses, diagnostics)
     allocate (plan%notes(0))
     call note_former_records(plan%input, reader, signals, plan%notes)
+    call set_axis(plan%input, reader, plan%axis)
   end subroutine read_quantities
+
+  !> Refuses curves, where one number is needed.
+  subroutine refuse_curves(input, kind, diagnostics)
+    type(input_t), intent(in) :: input
+    character(len=*), intent(in) :: kind   !! of the groups
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer, allocatable :: groups(:)
+    integer :: i, k
+
+    allocate (groups, source=input%groups_named(kind))
+    do i = 1, size(groups)
+      associate (words => input%groups(groups(i))%texts('statistic'))
+        if (any([(words(k)%text == 'curve', k=1, size(words))])) call input%report(groups(i), 'statistic', &
+          "statistic = 'curve' has a number for each speed; needed: a statistic with one number", diagnostics)
+      end associate
+    end do
+  end subroutine refuse_curves
+
+  !> What curves are over: the speeds of &response, or its frequencies.
+  subroutine set_axis(input, reader, axis)
+    type(input_t), intent(in) :: input
+    type(analysis_reader_t), intent(in) :: reader
+    type(curve_axis_t), intent(out) :: axis
+    integer :: unit
+
+    if (.not. allocated(reader%settings%speeds)) return   ! nothing over the speed is kept
+    if (reader%settings%axis%is_frequency) then
+      axis%label = 'frequency'
+      unit = unit_hz
+    else
+      axis%label = 'omega_' // input%groups(reader%settings%group)%text('body')
+      unit = unit_for('rad/s', output_units(input))
+    end if
+    axis%unit = 'rad/s'
+    if (unit > 0) axis%unit = trim(units(unit)%name)
+    axis%points = from_si(reader%settings%speeds, unit)
+  end subroutine set_axis
+
+  !> Refuses curves over speeds that differ between variants.
+  subroutine refuse_varied_axis(plan, diagnostics)
+    type(sweep_plan_t), intent(in) :: plan
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=*), parameter :: grid = 'speed frequency count'
+    integer :: i
+
+    if (.not. any(plan%analyses%is_curve())) return
+    do i = 1, size(plan%numbers%targets)
+      associate (target => plan%numbers%targets(i), group => plan%input%groups(plan%numbers%targets(i)%group))
+        if (group%kind /= 'response') cycle
+        associate (key => key_rules(first_key(group%rule) + target%key - 1)%name)
+          if (.not. has_word(grid, trim(key))) cycle
+          call plan%input%report(target%group, trim(key), trim(key) // " varies, and a &record with statistic = 'curve' " // &
+                                 'compares the variants at the same speeds; allowed: one of both', diagnostics)
+          return
+        end associate
+      end associate
+    end do
+  end subroutine refuse_varied_axis
 
   !> Adds wrong targets and quantities to the error of an input that cannot be read, if all its errors are in groups of the sweep
   !> and there are targets: the columns can depend on them.
@@ -288,8 +352,10 @@ contains
           header%results(one%result)%facts(3)%text = 'mode'
           header%results(one%result)%facts(4)%text = to_text(one%mode)
         end if
+        header%results(one%result)%point = one%point
       end associate
     end do
+    if (any(plan%analyses%is_curve())) header%axis = plan%axis
   end function new_sweep_header
 
   !> The first variant of a shard. Shards are equal, but for one variant more in the first ones if there is a remainder.

@@ -1,8 +1,10 @@
 !> Computes the results of a machine that need no motion.
 module nocdyn_variant_analysis
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_analyses, only: analysis_t
-  use nocdyn_analysis_results, only: analysis_crossing, analysis_damping_ratio, analysis_frequency, analysis_margin, &
-    analysis_peak, analysis_peak_frequency, analysis_peak_speed, analysis_ratio, analysis_result_t
+  use nocdyn_analysis_results, only: analysis_crossing, analysis_curve, analysis_damping_ratio, analysis_frequency, &
+    analysis_margin, analysis_mode_curve, analysis_peak, analysis_peak_frequency, analysis_peak_speed, analysis_ratio, &
+    analysis_result_t
   use nocdyn_campbell, only: analyse_campbell, campbell_t
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_excitation_lines, only: line_order
@@ -17,22 +19,24 @@ module nocdyn_variant_analysis
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
   use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
+  use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: worst_ratio
   use nocdyn_signals, only: former_name
   use nocdyn_text, only: to_text
-  use nocdyn_units, only: from_si
+  use nocdyn_units, only: from_si, unit_hz
   use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
 
-  public :: analyse_variant, find_valleys, matching_quantities, oscillating_modes
+  public :: analyse_variant, find_campbell, find_valleys, matching_quantities, oscillating_modes, place_of
 
   integer, parameter, public :: recorded_kinds(*) = [kind_moment]                  !! of an element, what its name records
   integer, parameter, public :: limited_kinds(*) = [kind_moment, kind_stress, kind_along]  !! and whose limits count
 
 contains
 
-  !> Computes the results of one machine.
+  !> Computes the results of one machine. A point of a curve is not a number where the machine has none: no steady state, one that
+  !> does not stay, or an overdamped mode.
   subroutine analyse_variant(input, results, values, error)
     type(input_t), intent(in) :: input
     type(analysis_result_t), intent(in) :: results(:)   !! paths are left out
@@ -42,11 +46,13 @@ contains
     type(machine_t) :: machine
     type(response_analysis_t) :: analysis
     type(mode_t), allocatable :: modes(:)
+    logical :: is_steady(size(results))
     integer :: i
 
     values = 0.0_wp
-    if (any(results%mode > 0 .and. .not. results%is_crossing)) then
-      call oscillating_modes(input, maxval(results%mode, mask=.not. results%is_crossing), modes, error)
+    is_steady = results%statistic == analysis_frequency .or. results%statistic == analysis_damping_ratio
+    if (any(is_steady)) then
+      call oscillating_modes(input, maxval(results%mode, mask=is_steady), modes, error)
       if (allocated(error)) return
     end if
     if (any(results%mode == 0)) then
@@ -57,6 +63,10 @@ contains
     end if
     if (any(results%is_crossing)) then
       call find_crossings(input, results, values, error)
+      if (allocated(error)) return
+    end if
+    if (any(results%statistic == analysis_mode_curve)) then
+      call find_mode_curves(input, results, values, error)
       if (allocated(error)) return
     end if
     do i = 1, size(results)
@@ -76,17 +86,12 @@ contains
     type(analysis_result_t), intent(in) :: results(:)
     real(wp), intent(inout) :: values(:)   !! [results]
     type(error_t), allocatable, intent(out) :: error
-    class(analysis_t), allocatable :: command
-    type(machine_t) :: machine
     type(campbell_t) :: campbell
     integer :: c, i
     real(wp), allocatable :: orders(:)
 
-    call new_analysis('campbell', command)
-    call assemble_analysed('campbell', command, input, machine, error)
-    if (allocated(error)) return
     orders = pack(results%order, results%is_crossing)   ! one may come more than once
-    call analyse_campbell(input, machine, modes_choice_t(), campbell, error, orders)
+    call find_campbell(input, campbell, error, orders)
     if (allocated(error)) return
     do i = 1, size(results)
       if (.not. results(i)%is_crossing) cycle
@@ -102,6 +107,54 @@ contains
       end associate
     end do
   end subroutine find_crossings
+
+  !> The diagram of Campbell of an input.
+  subroutine find_campbell(input, campbell, error, orders)
+    type(input_t), intent(in) :: input
+    type(campbell_t), intent(out) :: campbell
+    type(error_t), allocatable, intent(out) :: error
+    real(wp), intent(in), optional :: orders(:)   !! in place of those of the input
+    class(analysis_t), allocatable :: command
+    type(machine_t) :: machine
+
+    call new_analysis('campbell', command)
+    call assemble_analysed('campbell', command, input, machine, error)
+    if (.not. allocated(error)) call analyse_campbell(input, machine, modes_choice_t(), campbell, error, orders)
+  end subroutine find_campbell
+
+  !> The frequencies of modes at the speeds of the grid, as nocdyn campbell has them.
+  subroutine find_mode_curves(input, results, values, error)
+    type(input_t), intent(in) :: input
+    type(analysis_result_t), intent(in) :: results(:)
+    real(wp), intent(inout) :: values(:)   !! [results]
+    type(error_t), allocatable, intent(out) :: error
+    type(campbell_t) :: campbell
+    integer :: at, i
+
+    call find_campbell(input, campbell, error)
+    if (allocated(error)) return
+    do i = 1, size(results)
+      if (results(i)%statistic /= analysis_mode_curve) cycle
+      associate (modes => campbell%modes, mode => results(i)%mode)
+        if (mode > modes%modes) then
+          call raise(error, exit_failed, 'mode ' // to_text(mode) // ' is recorded, but the number of oscillating modes over ' // &
+                     'the speed is ' // to_text(modes%modes))
+          return
+        end if
+        values(i) = ieee_value(0.0_wp, ieee_quiet_nan)
+        at = place_of(campbell%settings%speeds(results(i)%point), campbell%speed)
+        if (at == 0) cycle
+        if (modes%exists(mode, at)) values(i) = from_si(modes%frequency(mode, at), unit_hz)
+      end associate
+    end do
+  end subroutine find_mode_curves
+
+  !> Where a speed is in a list, 0 if it is left out there.
+  pure integer function place_of(speed, speeds)
+    real(wp), intent(in) :: speed, speeds(:)
+
+    place_of = findloc(abs(speeds - speed) <= 0, .true., dim=1)
+  end function place_of
 
   !> The oscillating modes about the steady state, by their frequencies.
   subroutine oscillating_modes(input, needed, modes, error)
@@ -139,12 +192,18 @@ contains
     real(wp), intent(out) :: value   !! in SI
     type(error_t), allocatable, intent(inout) :: error
     real(wp) :: amplitude(size(analysis%response%points))
-    integer :: line, peak
+    integer :: i, line, peak
 
     value = 0.0_wp
     line = line_order(analysis%response%lines, one%order)
     call find_curve(analysis, one, line, amplitude, error)
     if (allocated(error)) return
+    if (one%statistic == analysis_curve) then
+      i = place_of(analysis%settings%speeds(one%point), analysis%response%speeds())
+      value = ieee_value(0.0_wp, ieee_quiet_nan)
+      if (i > 0) value = amplitude(i)
+      return
+    end if
     peak = maxloc(amplitude, dim=1, mask=is_between(analysis, one%window))
     if (peak == 0) return   ! no speed there
     associate (speed => analysis%response%points(peak)%state%speed)

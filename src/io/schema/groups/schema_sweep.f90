@@ -46,6 +46,7 @@ module nocdyn_schema_sweep
     kind_rule_t('record', 'peak_frequency', 'of response over the frequency of a shaker: where the peak is'), &
     kind_rule_t('record', 'margin',        'of response: distance of the peak to the speeds in operation, as a share'), &
     kind_rule_t('record', 'ratio',         'of response: largest ratio to the limits of &limit over the speed'), &
+    kind_rule_t('record', 'curve', 'of response: at each speed of &response; of mode: its frequency there'), &
     kind_rule_t('record', 'peak_value',    'of a signal of orbit: where its peak is'), &
     kind_rule_t('record', 'fold',          'of orbit = ''branch'': value of a fold, as orbit.json lists them'), &
     kind_rule_t('record', 'jump_up',       'of orbit = ''branch'': value of a fold at which a rising value jumps'), &
@@ -136,6 +137,7 @@ module nocdyn_schema_sweep
     example_t('record', "fatigue = 'life' statistic = 'damage', 'cycles'", .false.), &
     example_t('record', "mode = 2 statistic = 'frequency', 'damping_ratio'", .false.), &
     example_t('record', "response = 'coupling' order = 6 statistic = 'peak', 'peak_speed'", .false.), &
+    example_t('record', "response = 'coupling' statistic = 'curve'", .false.), &
     example_t('record', "orbit = 'branch' statistic = 'jump_up', 'jump_down'", .false.), &
     example_t('record', "path = 'campbell.crossings[1].speed_rad_s'", .false.), &
     example_t('record', 'trajectories = 1, 17, 90', .false.)]
