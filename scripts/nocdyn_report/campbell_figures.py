@@ -52,14 +52,14 @@ INSIDE = {**MARGIN, "color": DANGER}
 def draw_campbell(campbell: Campbell, window: tuple[float, float], top: float | None) -> Figure:
     figure, axes = pyplot.subplots(figsize=SIZE)
     axes.set_xlim(window)
-    axes.set_ylim(0.0, top or _top(campbell, window))
+    axes.set_ylim(0.0, top or top_of(campbell, window))
     shades = shade_operation(axes, campbell.operation)
     for _, frequency in campbell.lines:
         axes.plot(*thin(campbell.speed, frequency, PIXELS), zorder=2, **ORDER)
     for mode, frequency in campbell.modes.items():
-        axes.plot(*thin(campbell.speed, frequency, PIXELS), color=_colour(mode), linewidth=1.8, zorder=3)
-    _name_lines(axes, campbell)
-    _name_modes(axes, campbell)
+        axes.plot(*thin(campbell.speed, frequency, PIXELS), color=colour_of(mode), linewidth=1.8, zorder=3)
+    name_lines(axes, campbell)
+    name_modes(axes, campbell)
     shown = [one for one in campbell.crossings if window[0] <= one.speed <= window[1] and one.frequency <= axes.get_ylim()[1]]
     handles = _mark_crossings(axes, campbell, shown)
     axes.set_xlabel(plain(speed_label(campbell.body)))
@@ -67,11 +67,11 @@ def draw_campbell(campbell: Campbell, window: tuple[float, float], top: float | 
     above = [mode for mode, frequency in campbell.modes.items() if frequency.min() > axes.get_ylim()[1]]
     lines = Line2D([], [], label="orders, named at the border", **ORDER)
     add_legend(figure, handles=[lines, *handles, *shades], ncols=4, fontsize=8.5)
-    add_title(figure, campbell.title, "natural frequencies and orders over the speed" + _hidden(above))
+    add_title(figure, campbell.title, "natural frequencies and orders over the speed" + hidden_words(above))
     return figure
 
 
-def _hidden(modes: list[int]) -> str:
+def hidden_words(modes: list[int]) -> str:
     """What the title says of modes above the diagram."""
     if not modes:
         return ""
@@ -82,7 +82,7 @@ def _inside(campbell: Campbell, window: tuple[float, float]) -> np.ndarray:
     return (campbell.speed >= window[0]) & (campbell.speed <= window[1])
 
 
-def _top(campbell: Campbell, window: tuple[float, float]) -> float:
+def top_of(campbell: Campbell, window: tuple[float, float]) -> float:
     """Above the modes that a line meets, or comes near; the higher modes concern nobody."""
     inside = _inside(campbell, window)
     modes = sorted(frequency[inside].max() for frequency in campbell.modes.values())
@@ -96,7 +96,7 @@ def _top(campbell: Campbell, window: tuple[float, float]) -> float:
     return ROOM * (beyond if beyond <= 1.3 * reach else min(reach, max(2.0 * within[-1], 0.3 * reach)))
 
 
-def _name_lines(axes: Axes, campbell: Campbell) -> None:
+def name_lines(axes: Axes, campbell: Campbell) -> None:
     """Numbers of the orders where their lines leave the diagram: above it or at its right."""
     inside = _inside(campbell, axes.get_xlim())
     speed, top = campbell.speed[inside], axes.get_ylim()[1]
@@ -121,19 +121,19 @@ def _name_lines(axes: Axes, campbell: Campbell) -> None:
         axes.annotate(name, (1.0, y), (1.015, place), ha="left", va="center", **style)
 
 
-def _name_modes(axes: Axes, campbell: Campbell) -> None:
+def name_modes(axes: Axes, campbell: Campbell) -> None:
     """At the right of the orders' numbers."""
     top = axes.get_ylim()[1]
     last = np.flatnonzero(_inside(campbell, axes.get_xlim()))[-1]
     ends = [(frequency[last] / top, mode) for mode, frequency in campbell.modes.items() if frequency[last] <= top]
     places = spread(np.array([y for y, _ in ends]), MODE_NAMES * text_size("")[1] / PANEL[1])
     for (y, mode), place in zip(ends, places):
-        style = {"fontsize": 9, "color": _colour(mode), "ha": "left", "va": "center", "annotation_clip": False}
-        style |= {"xycoords": "axes fraction", "textcoords": "axes fraction", "arrowprops": {**LEADER, "color": _colour(mode)}}
+        style = {"fontsize": 9, "color": colour_of(mode), "ha": "left", "va": "center", "annotation_clip": False}
+        style |= {"xycoords": "axes fraction", "textcoords": "axes fraction", "arrowprops": {**LEADER, "color": colour_of(mode)}}
         axes.annotate(f"{roman(mode)}   {y * top:.4g} Hz", (1.0, y), (1.075, place), **style)
 
 
-def _colour(mode: int) -> str:
+def colour_of(mode: int) -> str:
     return MODE_COLOURS[(mode - 1) % len(MODE_COLOURS)]
 
 

@@ -241,8 +241,8 @@ def read_response(folder: Path) -> Response:
     report = _read_report(folder, "response", (TABLE, ORDERS), ("body",))
     axis = Axis(report.get("excitation", report["body"]), "excitation" in report)
     columns = read_column_list(folder, RESPONSE_COLUMNS)
-    table, speed, rising = _read_table(folder / TABLE)
-    order_table, order_speed, _ = _read_table(folder / ORDERS, rises=False)
+    table, speed, rising = read_speeds(folder / TABLE)
+    order_table, order_speed, _ = read_speeds(folder / ORDERS, rises=False)
     for file, there in ((TABLE, table), (ORDERS, order_table)):
         missing = [column.label for column in columns if column.file == file and column.label not in there]
         if missing:
@@ -270,13 +270,13 @@ def read_response(folder: Path) -> Response:
         quantities,
         [read_critical(entry, axis) for entry in report["resonances" if axis.is_frequency else "critical_speeds"]],
         [_barred(entry, axis) for entry in barred_in(report)],
-        _operation(report),
+        operation_of(report),
     )
 
 
 def read_campbell(folder: Path) -> Campbell:
     report = _read_report(folder, "campbell", ("campbell.csv",), ("body", "lines", "crossings"))
-    table, speed, rising = _read_table(folder / "campbell.csv")
+    table, speed, rising = read_speeds(folder / "campbell.csv")
     modes = {int(match["mode"]): label for label in table if (match := FREQUENCY.fullmatch(label))}
     if not modes:
         raise ResultsError(f"{folder / 'campbell.csv'}: nothing to draw: there is no column 'frequency_1 [Hz]'")
@@ -292,7 +292,7 @@ def read_campbell(folder: Path) -> Campbell:
         {mode: table[label].to_numpy()[rising] for mode, label in modes.items()},
         lines,
         [read_critical(entry, Axis(report["body"])) for entry in report["crossings"]],
-        _operation(report),
+        operation_of(report),
     )
 
 
@@ -305,7 +305,7 @@ def _read_report(folder: Path, command: str, tables: tuple[str, ...], keys: tupl
     return read_json(folder / f"{command}.json", keys)
 
 
-def _read_table(file: Path, rises: bool = True) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
+def read_speeds(file: Path, rises: bool = True) -> tuple[pd.DataFrame, np.ndarray, np.ndarray]:
     """A table whose first column is a speed, that in rpm, or the frequency of a shaker; the order of rows in which it rises."""
     labels = labels_of(file)
     match = SPEED.fullmatch(labels[0]) if labels else None
@@ -375,7 +375,7 @@ def _barred(entry: dict, axis: Axis) -> Barred:
     return Barred(entry["quantity"], *axis.span(entry), entry["can_be_passed"])
 
 
-def _operation(report: dict) -> Operation | None:
+def operation_of(report: dict) -> Operation | None:
     if "operating_rad_s" not in report:
         return None
     slow, fast = sorted(map(rpm, report["operating_rad_s"]), key=abs)

@@ -3,12 +3,15 @@
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
+from .band_figures import band_figures
+from .band_results import read_bands
 from .style import WIDTH, add_format_option, add_title, plain, save, saved
 from .sweep_curves import Family, add_hertz, draw_family, explain_marks, family_of
 from .sweep_influence import MOST_BARS, Influence, draw_influence
@@ -128,6 +131,8 @@ def _stack(rows: int, height: float, width: float = WIDTH, sharex: bool = False)
 
 def figures_of(sweep: Sweep) -> Iterator[tuple[str, Figure]]:
     """Names and figures; those of many results go on in NAME_2 ..."""
+    if not sweep.results:
+        return
     family = family_of(sweep)
     if family is None or not sweep.is_grid:  # how often a value comes along a curve says nothing
         yield from _paged("histograms", sweep, draw_histograms)
@@ -164,7 +169,8 @@ def main() -> None:
     folder = arguments.out or arguments.results / "figures"
     sweep = read_sweep(arguments.results)
     names = []
-    for name, figure in figures_of(sweep):
+    bands = read_bands(arguments.results, sweep)
+    for name, figure in chain(band_figures(bands, sweep.title) if bands else (), figures_of(sweep)):
         add_title(figure, sweep.title, sweep.remark)
         save(figure, folder, name, arguments.format)
         names.append(name)

@@ -1,7 +1,7 @@
 """The results of `nocdyn sweep`, read from their folder."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import f90nml
@@ -16,6 +16,7 @@ from .trajectory_files import need_folder, text_of
 DONE, REFUSED, FAILED = 0, 1, 2
 STATUS_WORDS = {"done": DONE, "refused": REFUSED, "failed": FAILED}
 DESIGN_NAMES = {"latin": "Latin", "sobol": "Sobol"}  # names of people and of squares
+BANDS = "bands.csv"
 LABEL = re.compile(r"(?P<name>.+?)(?: \[(?P<unit>[^]]*)\])?")
 
 
@@ -28,6 +29,11 @@ class Variable:
     long_name: str
     values: np.ndarray
     statistic: str = ""  # of a result
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether it has a value at each of several speeds: [variants, points]."""
+        return self.values.ndim > 1
 
     @property
     def label(self) -> str:
@@ -55,6 +61,7 @@ class Sweep:
     varied: list[Variable]
     results: list[Variable]
     status: np.ndarray
+    curves: list[Variable] = field(default_factory=list)  # results over the speed
 
     def known(self, result: Variable) -> np.ndarray:
         """The variants that have the result."""
@@ -98,14 +105,13 @@ def read_sweep(folder: Path) -> Sweep:
         )
     else:
         raise ResultsError(f"{folder}: no sweep.nc or sweep.csv here; is this the results folder of a 'nocdyn sweep'?")
-    if not sweep.varied or not sweep.results:
-        raise ResultsError(
-            f"{folder}: nothing to draw: the sweep has {len(sweep.varied)} varied numbers and {len(sweep.results)} results"
-        )
+    results = len(sweep.results) + len(sweep.curves)
+    if not sweep.varied or not results:
+        raise ResultsError(f"{folder}: nothing to draw: the sweep has {len(sweep.varied)} varied numbers and {results} results")
     if not (sweep.status == DONE).any():
         raise ResultsError(f"{folder}: nothing to draw: none of the {sweep.status.size} variants was done")
     drawn = [result for result in sweep.results if sweep.known(result).size]
-    if not drawn:
+    if not drawn and not sweep.curves:
         raise ResultsError(f"{folder}: nothing to draw: no variant has any of the results")
     return replace(sweep, results=drawn)
 
@@ -114,12 +120,14 @@ def _read_netcdf(file: Path) -> Sweep:
     try:
         with h5netcdf.File(file, "r") as content:
             status = content.variables["status"][...].astype(int)
+            results = _with_statistics(_variables(content, "result"), read_column_list(file.parent))
             return Sweep(
                 title=text_of(content.attrs.get("title", "")) or file.resolve().parent.name,
                 design=text_of(content.attrs["design"]),
                 varied=_variables(content, "parameter"),
-                results=_with_statistics(_variables(content, "result"), read_column_list(file.parent)),
+                results=[result for result in results if not result.is_curve],
                 status=status,
+                curves=[result for result in results if result.is_curve],
             )
     except KeyError as error:
         raise ResultsError(f"{file}: this is no sweep.nc of nocdyn: {error.args[0]} is missing") from None
@@ -134,7 +142,7 @@ def _variables(content: h5netcdf.File, role: str) -> list[Variable]:
                 text_of(variable.attrs.get(attribute, default))
                 for attribute, default in (("label", name), ("units", ""), ("long_name", name))
             ),
-            values=np.asarray(variable[...], dtype=float),
+            values=np.asarray(variable[...], dtype=float).T,
         )
         for name, variable in content.variables.items()
         if text_of(variable.attrs.get("role", "")) == role
@@ -156,6 +164,9 @@ def _read_table(file: Path) -> Sweep:
         raise ResultsError(f"{file}: not the table of a sweep: {' '.join(str(error).split())}") from None
     machine = _read_input(file.with_name("input.nml"))
     columns = read_column_list(file.parent)
+    curves = [_curve(column, variables) for column in columns if column.statistic == "curve" and column.file != BANDS]
+    points = {variable.name for curve, names in curves for variable in names}
+    variables = [variable for variable in variables if variable.name not in points]
     results = {column.label for column in columns}
     return Sweep(
         title=machine.get("case", {}).get("title") or file.resolve().parent.name,
@@ -163,7 +174,16 @@ def _read_table(file: Path) -> Sweep:
         varied=[variable for variable in variables if variable.label not in results],
         results=_with_statistics([variable for variable in variables if variable.label in results], columns),
         status=status,
+        curves=[curve for curve, _ in curves],
     )
+
+
+def _curve(column: Column, variables: list[Variable]) -> tuple[Variable, list[Variable]]:
+    """A curve of a table, which has a column for each of its points, and these."""
+    number = re.compile(rf"{re.escape(column.name)}_(\d+)")
+    points = [variable for variable in variables if number.fullmatch(variable.name)]
+    values = np.column_stack([point.values for point in points])
+    return Variable(column.name, column.unit, column.name, values, column.statistic), points
 
 
 def _with_statistics(results: list[Variable], columns: list[Column]) -> list[Variable]:

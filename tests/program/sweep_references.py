@@ -89,9 +89,54 @@ def tolerance(values):
     }
 
 
+POINTS = (1, 81, 155)  # of a curve, from 1
+
+
+def coupling_tolerance(values):
+    """Amplitudes and half ranges of the rubber coupling: a linear system at each order of each speed, and a sum of sines."""
+    m = Machine(SWEEPS / "coupling_tolerance.nml")
+    for target, factor in values.items():
+        group, element, key = target.split(".")
+        m.kinds[group][element][key] *= factor
+    gas = m.excitation["gas"]
+    first, last = m.response[""]["speed"]
+    found = {}
+    for point in POINTS:
+        speed = first + (last - first) * (point - 1) / (m.response[""]["count"] - 1)
+        moments = [rubber_moment(m, order * speed, torque) for order, torque in zip(gas["orders"], gas["amplitudes"])]
+        turns = np.linspace(0, 4 * np.pi, 40001)  # the order 0.5 repeats after two turns
+        moment = sum((one * np.exp(1j * order * turns)).imag for order, one in zip(gas["orders"], moments))
+        found[f"total_moment_rubber_curve_{point}"] = np.ptp(moment) / 2
+        found[f"total_moment_rubber_order_0.5_curve_{point}"] = abs(moments[0])
+    return found
+
+
+def rubber_moment(m, omega, torque):
+    """Its complex amplitude, of a torque on the engine with this frequency."""
+    bodies = ["engine", "flywheel", "hub", "rotor"]
+    matrix = np.diag([-(omega**2) * m.inertia(body) + 0j for body in bodies])
+    matrix[3, 3] += 1j * omega * m.load["grid"]["viscous"]
+    rubber = m.coupling["rubber"]
+    stiffness = {
+        "rubber": rubber["stiffness"] * (1 + 1j * rubber["relative_damping"] / (2 * np.pi)),
+        **{name: m.coupling[name]["stiffness"] + 1j * omega * m.coupling[name]["damping"] for name in ("crank", "shaft")},
+    }
+    for name, value in stiffness.items():
+        a, b = (bodies.index(body) for body in m.coupling[name]["bodies"])
+        matrix[np.ix_([a, b], [a, b])] += value * np.array([[1, -1], [-1, 1]])
+    phi = np.linalg.solve(matrix, [torque, 0, 0, 0])
+    return stiffness["rubber"] * (phi[1] - phi[2])
+
+
 def results(name, values):
     """By label."""
-    return {"throughput": throughput, "resonance": resonance, "tolerance": tolerance}[name](values)
+    programs = {
+        "throughput": throughput,
+        "resonance": resonance,
+        "tolerance": tolerance,
+        "coupling_tolerance": coupling_tolerance,
+    }
+    return programs[name](values)
 
 
 def without_units(row):
@@ -102,7 +147,7 @@ def main(name, table, *variants):
     with open(table, newline="", encoding="utf-8") as file:
         rows = {row["variant"]: row for row in map(without_units, csv.DictReader(file))}
     for variant in variants:
-        values = {target: float(text) for target, text in rows[variant].items() if "." in target}
+        values = {target: float(text) for target, text in rows[variant].items() if target.count(".") == 2}
         print(f"        {variant}: ({{")
         for target, value in values.items():
             print(f'            "{target}": {value!r},')

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.skipif(not (Path(os.environ["NOCDYN"]).parent / "nocdyn
 SWEEPS = SOURCE / "input/sweeps"
 
 # Variants to compute: where they depend on `samples`, references are of this many.
-SAMPLES = {"throughput": 200, "resonance": None, "tolerance": 100}
+SAMPLES = {"throughput": 200, "resonance": None, "tolerance": 100, "coupling_tolerance": 100}
 
 # By variant the values of the varied keys and the results, by sweep_references.py, which prints these tables.
 REFERENCE = {
@@ -165,10 +165,57 @@ REFERENCE = {
             },
         ),
     },
+    "coupling_tolerance": {
+        1: (
+            {
+                "coupling.rubber.stiffness": 1.0236811513427764,
+                "coupling.rubber.relative_damping": 1.0268851725617423,
+                "body.rotor.inertia": 0.9612273508799262,
+            },
+            {
+                "total_moment_rubber_curve_1": 5194.77088113,
+                "total_moment_rubber_order_0.5_curve_1": 1375.051027158,
+                "total_moment_rubber_curve_81": 4774.127996991,
+                "total_moment_rubber_order_0.5_curve_81": 4680.220235509,
+                "total_moment_rubber_curve_155": 1076.517607314,
+                "total_moment_rubber_order_0.5_curve_155": 1073.312715297,
+            },
+        ),
+        57: (
+            {
+                "coupling.rubber.stiffness": 1.0036683376785847,
+                "coupling.rubber.relative_damping": 1.2425101725617425,
+                "body.rotor.inertia": 0.9627898508799262,
+            },
+            {
+                "total_moment_rubber_curve_1": 4726.47460077,
+                "total_moment_rubber_order_0.5_curve_1": 1376.027230955,
+                "total_moment_rubber_curve_81": 4212.886421582,
+                "total_moment_rubber_order_0.5_curve_81": 4038.964716911,
+                "total_moment_rubber_curve_155": 1037.875328815,
+                "total_moment_rubber_order_0.5_curve_155": 1029.868102582,
+            },
+        ),
+        100: (
+            {
+                "coupling.rubber.stiffness": 1.096036696390715,
+                "coupling.rubber.relative_damping": 0.9471976725617424,
+                "body.rotor.inertia": 1.0229461008799263,
+            },
+            {
+                "total_moment_rubber_curve_1": 5978.858002004,
+                "total_moment_rubber_order_0.5_curve_1": 1415.632986522,
+                "total_moment_rubber_curve_81": 5017.806280793,
+                "total_moment_rubber_order_0.5_curve_81": 5078.994011305,
+                "total_moment_rubber_curve_155": 1191.318670344,
+                "total_moment_rubber_order_0.5_curve_155": 1186.197924864,
+            },
+        ),
+    },
 }
 
 # Of a result's size. rtol = atol of throughput.nml are 1e-6 a step, those of the others 1e-9 and less.
-ACCURACY = {"throughput": 1e-6, "resonance": 1e-8, "tolerance": 1e-7}
+ACCURACY = {"throughput": 1e-6, "resonance": 1e-8, "tolerance": 1e-7, "coupling_tolerance": 1e-7}
 
 # Of the errors of W2 in scripts/bench: absolute ones of the states, relative ones of the peak.
 WANTED = 1e-6

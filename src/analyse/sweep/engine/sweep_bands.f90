@@ -74,8 +74,26 @@ contains
       self%columns(k)%unit = 'Hz'
       self%columns(k)%values = nominal%frequencies(:, l)
     end do
-    self%columns = pack(self%columns, [(any(is_finite(self%columns(k)%values)), k=1, size(self%columns))])
+    call leave_out_empty(self%columns)
   end subroutine new_bands
+
+  !> Drops columns without any number.
+  subroutine leave_out_empty(columns)
+    type(band_column_t), allocatable, intent(inout) :: columns(:)
+    type(band_column_t), allocatable :: kept(:)
+    logical :: has_numbers(size(columns))
+    integer :: k, n
+
+    has_numbers = [(any(is_finite(columns(k)%values)), k=1, size(columns))]
+    allocate (kept(count(has_numbers)))
+    n = 0
+    do k = 1, size(columns)
+      if (.not. has_numbers(k)) cycle
+      n = n + 1
+      kept(n) = columns(k)
+    end do
+    call move_alloc(kept, columns)
+  end subroutine leave_out_empty
 
   !> The first and the last point of a curve among the points of all curves.
   pure function nominal_range(before, points) result(range)

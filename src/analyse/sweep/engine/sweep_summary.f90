@@ -1,6 +1,6 @@
 !> The summary of a sweep: the text of summary.json, and the printed table.
 module nocdyn_sweep_summary
-  use nocdyn_input, only: input_t
+  use nocdyn_input, only: group_t, input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_sweep_bands, only: bands_file, sweep_bands_t
@@ -43,6 +43,7 @@ contains
     type(sweep_summary_t), intent(in) :: summary
     character(len=:), allocatable :: text
     type(json_t) :: json
+    type(group_t) :: response
     integer :: i
 
     call json%open_report(input%file, header%title, merge('done  ', 'failed', summary%done > 0))
@@ -96,6 +97,11 @@ contains
       call json%put('file', bands_file)
       call json%put('points', size(summary%bands%axis))
       call json%put('curves', summary%bands%curves)
+      response = input%single('response')
+      if (response%has_value('operating')) then
+        call json%put('operating_rad_s', response%numbers('operating'))
+        call json%put('margin', response%number('margin', absent=0.0_wp))
+      end if
       call json%close()
     end if
     call json%close()

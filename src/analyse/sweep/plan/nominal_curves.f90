@@ -41,7 +41,7 @@ contains
     type(diagnostics_t) :: diagnostics
     type(error_t), allocatable :: failure
     type(machine_t) :: machine
-    integer :: i
+    integer :: i, n
 
     call assemble_machine(input, machine, error)
     if (.not. allocated(error)) call new_analysis_reader(input, machine, reader, error)
@@ -54,7 +54,13 @@ contains
         end if
       end do
     end associate
-    allocate (curves, source=pack(all_results, all_results%is_curve()))
+    allocate (curves(count(all_results%is_curve())))
+    n = 0
+    do i = 1, size(all_results)
+      if (.not. all_results(i)%is_curve()) cycle
+      n = n + 1
+      curves(n) = all_results(i)
+    end do
     allocate (self%values(size(curves)))
     call analyse_variant(input, curves, self%values, failure)
     if (allocated(failure)) self%values = ieee_value(0.0_wp, ieee_quiet_nan)
