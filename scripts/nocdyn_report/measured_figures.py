@@ -1,15 +1,16 @@
 """Measured values over the computed ones, and their differences: of a run, a response or modes with &measurement."""
 
-import json
 import textwrap
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
-import pandas as pd
+import numpy as np
 from matplotlib import pyplot
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from .comparisons import FREQUENCY, ORDER, SERIES, Comparison, read_comparisons
+from .speed_results import rpm
 from .style import COLOURS, PIXELS, REFERENCE, WIDTH, add_title, plain
 from .thinning import thin
 
@@ -18,64 +19,83 @@ COMPUTED = {"color": COLOURS[0], "linewidth": 1.2}
 LONGEST = 34  # characters of a line beside a panel
 MOST_POINTS = 40  # of a record that has a mark for each value
 DIGITS = 4
+BAR = 0.38  # width of one of two bars at a mode
+FEWEST = 4  # modes that have room
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """A member of the list `measurements` of a report, with its file."""
-
-    facts: Mapping
-    table: pd.DataFrame
-
-    @property
-    def remark(self) -> str:
-        """Its statistics."""
-        words = [f"bias {self._value('bias')}", f"spread {self._value('spread')} {self.facts['unit']}"]
-        if "correlation" in self.facts:
-            words.append(f"correlation {self._value('correlation')}")
-        if self.facts.get("delay_s"):
-            words.append(f"clock moved by {self._value('delay_s')} s")
-        if "band_Hz" in self.facts:
-            words.append("{:g} to {:g} Hz".format(*self.facts["band_Hz"]))
-        return ", ".join(words)
-
-    def _value(self, key: str) -> str:
-        return f"{self.facts[key]:.{DIGITS}g}"
+def remark_on(comparison: Comparison) -> str:
+    """Its statistics."""
+    facts = comparison.facts
+    words = [f"bias {_value(comparison, 'bias')}", f"spread {_value(comparison, 'spread')} {comparison.unit}"]
+    if "correlation" in facts:
+        words.append(f"correlation {facts['correlation']:.{DIGITS}g}")
+    if facts.get("delay_s"):
+        words.append(f"clock moved by {facts['delay_s']:.{DIGITS}g} s")
+    if "band_Hz" in facts:
+        words.append("{:g} to {:g} Hz".format(*facts["band_Hz"]))
+    return ", ".join(words)
 
 
-def read_comparisons(folder: Path, report: str) -> list[Comparison]:
-    """Those of a report such as 'summary.json' that have values; none if the report is missing."""
-    file = folder / report
-    if not file.is_file():
-        return []
-    members = json.loads(file.read_text(encoding="utf-8")).get("measurements", [])
-    drawn = (one for one in members if one["values"] > 1 and (folder / one["file"]).is_file())
-    return [Comparison(one, pd.read_csv(folder / one["file"])) for one in drawn]
+def _value(comparison: Comparison, key: str) -> str:
+    return f"{comparison.value(key):.{DIGITS}g}"
 
 
 def draw_comparison(comparison: Comparison, title: str) -> Figure:
-    """Both over their abscissa, and below them the differences."""
-    facts, table = comparison.facts, comparison.table
+    """Both over the time or the speed, and below them the differences."""
     figure, (upper, lower) = pyplot.subplots(2, 1, sharex=True, figsize=(WIDTH, 5.2), height_ratios=(2, 1))
-    x = table.iloc[:, 0].to_numpy()
-    mark = {"marker": "o", "markersize": 3.5} if len(x) <= MOST_POINTS else {}
-    for place, look, label in ((1, MEASURED, "measured"), (2, COMPUTED, "computed")):
-        upper.plot(*thin(x, table.iloc[:, place].to_numpy(), PIXELS), label=label, **look, **mark)
-    lower.axhline(facts["bias"], **REFERENCE)
-    lower.plot(*thin(x, table.iloc[:, 3].to_numpy(), PIXELS), color=COLOURS[1], linewidth=1.0, **mark)
+    x = comparison.abscissa if comparison.kind == SERIES else rpm(comparison.abscissa)
+    mark = {"marker": "o", "markersize": 3.5} if comparison.kind == ORDER or len(x) <= MOST_POINTS else {}
+    line = {} if comparison.kind == SERIES else {"linestyle": "none"}  # between the measured speeds it may have been anything
+    upper.plot(*thin(x, comparison.measured, PIXELS), label="measured", **MEASURED, **mark, **line)
+    upper.plot(*thin(x, comparison.computed, PIXELS), label="computed", **COMPUTED, **mark)
+    lower.axhline(comparison.value("bias"), **REFERENCE)
+    lower.plot(*thin(x, comparison.computed - comparison.measured, PIXELS), color=COLOURS[1], linewidth=1.0, **mark)
     upper.legend(loc="best", ncols=2)
-    order = f", order {facts['order']:g}" if "order" in facts else ""
-    upper.set_ylabel(plain(textwrap.fill(f"{facts['caption']}{order} [{facts['unit']}]", LONGEST)))
-    lower.set_ylabel(f"difference\n[{facts['unit']}]")
-    lower.set_xlabel({"t [s]": "time [s]"}.get(table.columns[0], table.columns[0]))
+    upper.set_ylabel(plain(textwrap.fill(f"{comparison.facts['caption']} [{comparison.unit}]", LONGEST)))
+    lower.set_ylabel(f"difference\n[{comparison.unit}]")
+    lower.set_xlabel("time [s]" if comparison.kind == SERIES else "speed [rpm]")
     if not mark:
         lower.set_xlim(min(x), max(x))
-    name = f"{facts['name']}: {facts.get('signal', 'natural frequencies')}"
-    add_title(figure, title, name, comparison.remark)
+    add_title(figure, title, f"{comparison.name}: {comparison.subject}", remark_on(comparison))
     return figure
 
 
+def draw_frequencies(comparison: Comparison, title: str) -> Figure:
+    """Measured and computed frequencies by the number of their mode, and damping ratios below if they were measured."""
+    panels = [("natural frequency [Hz]", comparison.measured, comparison.computed)]
+    if comparison.dampings:
+        panels.append(("damping ratio", *comparison.dampings))
+    figure, grid = pyplot.subplots(len(panels), 1, squeeze=False, figsize=(WIDTH, 2.6 * len(panels) + 1.0))
+    for axes, (label, measured, computed) in zip(grid.flat, panels):
+        _draw_bars(axes, comparison.abscissa, measured, computed)
+        axes.set_ylabel(label)
+    grid.flat[0].legend(loc="upper left", ncols=2)
+    grid.flat[-1].set_xlabel("mode; above the bars: difference of the computed value")
+    remark = remark_on(comparison) if len(comparison.measured) > 1 else ""
+    add_title(figure, title, f"{comparison.name}: {comparison.subject}", remark)
+    return figure
+
+
+def _draw_bars(axes: Axes, modes: np.ndarray, measured: np.ndarray, computed: np.ndarray) -> None:
+    """Two bars for each mode, and what the computed value differs by."""
+    for side, values, look, label in ((-0.5, measured, MEASURED, "measured"), (0.5, computed, COMPUTED, "computed")):
+        axes.bar(modes + side * BAR, values, width=BAR, color=look["color"], label=label)
+    for mode, one, other in zip(modes, measured, computed):
+        told = f"{100 * (other - one) / one:+.2g} %" if one else ""
+        axes.annotate(told, (mode, max(one, other)), (0, 3), textcoords="offset points", ha="center", fontsize=8.5)
+    axes.set_xlim(0.5, max(modes.max(), FEWEST) + 0.5)
+    axes.margins(y=0.25)
+    axes.grid(visible=False, axis="x")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
 def measured_figures(folder: Path, report: str, title: str) -> dict[str, Figure]:
-    """A figure for each measurement, by the name of its file."""
-    comparisons = read_comparisons(folder, report)
-    return {one.facts["file"].removesuffix(".csv"): draw_comparison(one, title) for one in comparisons}
+    """A figure for each measurement with several values, and of all frequencies, by the name of its file."""
+    figures = {}
+    for one in read_comparisons(folder, report):
+        name = one.facts["file"].removesuffix(".csv")
+        if one.kind == FREQUENCY:
+            figures[name] = draw_frequencies(one, title)
+        elif one.facts["values"] > 1:
+            figures[name] = draw_comparison(one, title)
+    return figures

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from .failure import ResultsError
 from .json_files import with_case
+from .measured_figures import measured_figures
 from .modes_results import Modes, read_modes
 from .report.result_files import case_of
 from .style import COLOURS, WIDTH, add_format_option, add_title, plain, save, saved
@@ -85,7 +86,7 @@ def _name_bars(axes: Axes, modes: Modes) -> None:
 
 
 def draw_all(modes: Modes, most: int, folder: Path, formats: Sequence[str]) -> list[str]:
-    """Saves figures of the first modes, a few in each, and gives their names."""
+    """Saves figures of the first modes, a few in each, and of measured frequencies; gives their names."""
     chosen = modes.shaped[:most]
     if not chosen:
         raise ResultsError(f"{modes.folder / 'modes.json'}: nothing to draw: no mode oscillates")
@@ -99,6 +100,9 @@ def draw_all(modes: Modes, most: int, folder: Path, formats: Sequence[str]) -> l
         add_title(figure, *titles)
         names.append("modes" if part == 0 else f"modes_{part + 1}")
         save(figure, folder, names[-1], formats)
+    for name, figure in measured_figures(modes.folder, "modes.json", titles[0]).items():
+        save(figure, folder, name, formats)
+        names.append(name)
     return names
 
 

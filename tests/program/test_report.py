@@ -368,6 +368,51 @@ def test_a_load_case_without_a_steady_state_leaves_the_sections_to_the_next(fres
     assert {"steady", "modes", "campbell", "response", "motion"} <= set(found)
 
 
+MEASURED = """&case title = 'Bench' /
+&body name = 'a' inertia = 1.0 speed_rpm = 300 /
+&body name = 'b' inertia = 2.0 /
+&coupling name = 'c' bodies = 'a', 'b' stiffness = 1e4 damping = 4.0 /
+&load name = 'l' body = 'b' quadratic = 0.05 /
+&excitation name = 'e' body = 'a' kind = 'orders' orders = 1, 2 amplitudes = 10, 5 /
+&motor name = 'm' body = 'a' kind = 'constant' torque = 100 /
+&response body = 'a' speed_rpm = 200, 1400 count = 40 /
+&measurement name = 'gauge' signal = 'total_moment_c' times = 0, 0.1, 0.2, 0.3 values = 0, -60, -70, -65 /
+&measurement name = 'line' kind = 'order' order = 2 signal = 'total_moment_c' speeds_rpm = 300, 600, 900 values = 4, 70, 5 /
+&measurement name = 'peak' kind = 'peak' signal = 'total_moment_c' statistic = 'smallest' values = -120 /
+&measurement name = 'impact' kind = 'frequency' frequency_hz = 19.2 relative_damping = 0.021 /
+&run t_end = 0.5 /
+"""
+
+
+def test_measurements_stand_beside_what_was_computed(fresh, browser):
+    fresh.write("m.nml", MEASURED)
+    outcome = fresh("m.nml", "--no-pdf")
+    assert outcome.returncode == 0, outcome.stderr
+    browser.open(fresh.page())
+    assert faults(browser) == []
+    for part, name, names in (
+        ("modes", "modes.json", ["impact"]),
+        ("response", "response.json", ["line"]),
+        ("summary", "summary.json", ["gauge", "peak"]),
+    ):
+        members = results(fresh, name)["measurements"]
+        assert [one["name"] for one in members] == names and browser.find(f"#measured-{part}")
+    shown = column(browser, "Differences to what was measured", "bias")  # the first: of the modes
+    table = pd.read_csv(fresh.folder / "results/m/measured_impact.csv")
+    hertz = table["difference [rad/s]"][0] / (2 * np.pi)
+    assert plain(shown[0].split(" ")[0]) == pytest.approx(hertz, rel=1e-3)
+    damping = column(browser, "Measured natural frequencies: impact", "computed damping")
+    assert plain(damping[0]) == pytest.approx(table["computed_damping [1]"][0], rel=1e-3)
+    curves = browser.ask("""
+        return [...document.querySelectorAll('figure')].filter((one) => one.textContent.includes('Measured and computed values'))
+          .map((one) => [one.querySelectorAll('.picture path.curve.role-computed').length,
+            one.querySelectorAll('.picture path.role-measured, .picture circle.role-measured').length]);""")
+    assert curves == [[1, 3], [2, 2]]  # the order over the speed; the torque over the time, also about its largest difference
+    (fresh.folder / "results/m/measured_line.csv").unlink()
+    lines = fresh("m.nml", "--no-pdf").stdout
+    assert "response     computed" in lines and "modes        reused" in lines
+
+
 def test_set_reaches_every_calculation(fresh):
     text = without_notes(PLANT)
     fresh.write("m.nml", text)

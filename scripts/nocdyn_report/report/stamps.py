@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .program import Program
-from .result_files import CASES, ResultFiles
+from .result_files import CASES, CaseResult, ResultFiles
 from .writing import write_whole
 
 NAME = "report.json"
@@ -66,10 +66,17 @@ class Stamps:
     def _digests(self, command: str, names: Sequence[str]) -> dict[str, str | None]:
         """Of the files of the machine, or of all load cases and of the report on them."""
         cases = self.results.cases(command)
-        files = [one.folder / name for one in cases for name in names]
+        files = [one.folder / name for one in cases for name in [*names, *self._measured(one, command)]]
         if any(one.name for one in cases):
             files.append(self.folder / CASES.get(command, CASES["modes"]))
         return {str(file.relative_to(self.folder)): _digest(file) for file in files}
+
+    def _measured(self, case: CaseResult, command: str) -> list[str]:
+        """The files of measurements, which the report of a command names."""
+        try:
+            return [one["file"] for one in self.results.read(case, command).get("measurements", [])]
+        except (OSError, ValueError):
+            return []
 
 
 def _digest(file: Path) -> str | None:

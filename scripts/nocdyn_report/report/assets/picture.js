@@ -121,7 +121,7 @@ class Picture {
   drawCurve(inner, curve) {
     if (curve.points || curve.dots) {
       const name = curve.points ? `point ${curve.look}` : `dot ${curve.look}`;
-      const size = { far: 3, margin: 5, inside: 5 }[curve.role] || 3;
+      const size = { far: 3, margin: 5, inside: 5, measured: 4.5 }[curve.role] || 3;
       inner.selectAll(null).data(d3.range(curve.x.length).filter((i) => Number.isFinite(curve.y[i]))).enter().append("circle")
         .attr("class", name).attr("r", size).attr("cx", (i) => this.x(curve.x[i])).attr("cy", (i) => this.y(curve.y[i]));
     }

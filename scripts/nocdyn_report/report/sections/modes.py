@@ -10,6 +10,7 @@ from ..content import Figure, Heading, Panel, Paragraph, Section, Table, by_colu
 from ..numbers import name_and_unit, number_text, percent
 from ..readable import texts
 from ..sources import Sources
+from .measured import measured_blocks
 
 MOST_ROWS = 60
 MOST_FURTHER = 12  # modes above those of the section
@@ -42,6 +43,7 @@ def modes_section(sources: Sources) -> Section | None:
             section.add(_shapes(sources, modes.shaped[:MOST_SHAPES]))
     else:
         section.add(Paragraph("Nothing oscillates: there is no mode with a frequency."))
+    section.add(*measured_blocks(sources, sources.folder("modes"), "modes.json"))
     if others := [mode for mode in modes.content["modes"] if mode["kind"] != "oscillating"]:
         section.add_details(_others(others, modes))
     return section.add_details(Heading("Holzer tables", "holzer"), *_holzer(sources))

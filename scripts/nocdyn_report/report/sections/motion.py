@@ -25,6 +25,7 @@ from ..naming import WHOLE, is_end, name_of
 from ..numbers import number_text
 from ..readable import texts
 from ..sources import Run, Sources
+from .measured import measured_blocks
 
 CYLINDER = re.compile(r"_\d+(_\d+)?$")  # that a torque of an engine ends with
 MOST_CURVES = 3  # of a panel of speeds or torques
@@ -43,7 +44,7 @@ def motion_section(sources: Sources) -> Section | None:
     for run in sources.runs:
         if run.name:
             section.add(Heading(f"Load case {run.name}", anchor(run.name)))
-        section.add(*_of_run(sources, run))
+        section.add(*_of_run(sources, run), *measured_blocks(sources, run.folder, "summary.json", _of(run)))
         section.add_details(*_extremes(sources, run, is_main=False))
     return section
 

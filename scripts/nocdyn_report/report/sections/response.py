@@ -13,6 +13,7 @@ from ..numbers import number_text
 from ..readable import texts
 from ..sources import Sources
 from .campbell import operation_bands
+from .measured import measured_blocks
 
 MOST_PANELS = 24
 MOST_ROWS = 60
@@ -34,6 +35,9 @@ def response_section(sources: Sources) -> Section | None:
     section.add_details(*_largest(sources, whole=False))
     if others := [one for one in told_quantities(sources.response) if not has_limit(one)]:
         section.add(*_small(sources, others))
+    for case, response in sources.responses():
+        of = f" of load case {case}" if case else ""
+        section.add(*measured_blocks(sources, response.folder, "response.json", of, response))
     return section
 
 
