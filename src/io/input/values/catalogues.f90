@@ -53,7 +53,7 @@ contains
         call append(messages, place(file, table%lines(r)) // table%row_problem(r))
         cycle
       end if
-      catalogue%sizes(r)%text = unquoted(table%cell(size_at, r))
+      catalogue%sizes(r)%text = table%cell(size_at, r)
       if (catalogue%sizes(r)%text == '') call append(messages, place(file, table%lines(r)) // 'a row without a size')
       if (catalogue%row(catalogue%sizes(r)%text) < r) call append(messages, place(file, table%lines(r)) // 'the size ' // &
         quoted(shortened(catalogue%sizes(r)%text)) // ' is given twice')
@@ -78,7 +78,7 @@ contains
     size_at = 0
     allocate (column(0), keys(0), conversions(0))
     do c = 1, table%columns
-      call split_unit(unquoted(table%headings(c)%text), name, unit)
+      call split_unit(table%headings(c)%text, name, unit)
       name = as_key(name)
       if (name == size_column) then
         if (size_at == 0) size_at = c
@@ -254,16 +254,6 @@ contains
       if (key(i:i) == ' ') key(i:i) = '_'
     end do
   end function as_key
-
-  !> A cell without the quotes about it.
-  pure function unquoted(text) result(plain)
-    character(len=*), intent(in) :: text
-    character(len=:), allocatable :: plain
-
-    plain = trim(adjustl(text))
-    if (len(plain) < 2) return
-    if (scan(plain(1:1), '"' // "'") > 0 .and. plain(len(plain):) == plain(1:1)) plain = plain(2:len(plain) - 1)
-  end function unquoted
 
   !> "couplings.csv:3: "
   pure function place(file, line) result(text)
