@@ -130,7 +130,7 @@ contains
     if (allocated(error)) return
     call choose_row_count(input, formulation%machine, rows, notes)
     times = output_times(input, rows)
-    call prepare_measurements(input, times([1, size(times)]), series, observer%peaks, correlations, error)
+    call prepare_measurements(input, formulation%machine, times([1, size(times)]), series, observer%peaks, correlations, error)
     if (allocated(error)) return
     observer%samples = new_run_samples(series, times([1, size(times)]))
     summary%method = trim(settings%method)
@@ -163,8 +163,9 @@ contains
   end subroutine run_transient
 
   !> Reads what was measured over the time, and finds the delays of clocks that are to be found, by a run of its own.
-  subroutine prepare_measurements(input, span, series, peaks, correlations, error)
+  subroutine prepare_measurements(input, machine, span, series, peaks, correlations, error)
     type(input_t), intent(in) :: input
+    type(machine_t), intent(in) :: machine   !! of the run
     real(wp), intent(in) :: span(2)   !! start and end of the run [s]
     type(measurement_t), allocatable, intent(out) :: series(:), peaks(:)
     real(wp), allocatable, intent(out) :: correlations(:)   !! by which delays were found, [series]
@@ -175,11 +176,10 @@ contains
     type(signal_t), allocatable :: signals(:)
     integer :: i
 
-    allocate (signals(0))
     if (size(input%groups_named('measurement')) > 0) then
-      call build_formulation(input, formulation, settings, notes, error)
-      if (allocated(error)) return
-      call list_signals(formulation%machine, signals)
+      call list_signals(machine, signals)
+    else
+      allocate (signals(0))
     end if
     call read_measurements(input, [measured_series], signals, series, error)
     if (.not. allocated(error)) call read_measurements(input, [measured_peak], signals, peaks, error)
@@ -192,7 +192,9 @@ contains
     end if
     if (allocated(error)) return
     allocate (correlations(size(series)), source=0.0_wp)
-    if (any(series%finds_delay)) call find_delays(formulation, settings, span, series, correlations, error)
+    if (.not. any(series%finds_delay)) return
+    call build_formulation(input, formulation, settings, notes, error)
+    if (.not. allocated(error)) call find_delays(formulation, settings, span, series, correlations, error)
   end subroutine prepare_measurements
 
   !> Notes on the damping of the modes about the start angles.
