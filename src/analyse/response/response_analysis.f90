@@ -18,8 +18,8 @@ module nocdyn_response_analysis
   use nocdyn_response_choice, only: choose_quantities, choose_shown, find_couplings
   use nocdyn_response_fatigue, only: find_response_fatigue, response_fatigue_t
   use nocdyn_response_limits, only: read_limits, response_limit_t
-  use nocdyn_response_notes, only: note_linear_ranges, note_numbers, note_other_excitations, note_overloads, note_rated_speeds, &
-    note_rules, note_separation, note_shaft_modes, note_simplifications, note_steady_states
+  use nocdyn_response_notes, only: note_linear_ranges, note_measurements, note_numbers, note_other_excitations, &
+    note_overloads, note_rated_speeds, note_rules, note_separation, note_shaft_modes, note_simplifications, note_steady_states
   use nocdyn_response_points, only: keep_points
   use nocdyn_response_settings, only: place_error, read_response_settings, response_settings_t
   use nocdyn_state_modes, only: most_coordinates
@@ -95,7 +95,10 @@ contains
       call place_error(input, self%settings, failed_speed, error)
     else
       call note_speeds(self%response, self%unstable, 'they are left out', self%notes)
-      if (self%settings%shaker > 0) call note_other_excitations(self%settings, self%response, self%notes)
+      if (self%settings%shaker > 0) then
+        call note_other_excitations(self%settings, self%response, self%notes)
+        call note_measurements(input, self%notes)
+      end if
       call note_steady_states(self%response, self%notes)
       call note_numbers(self%modes, self%notes)
       if (self%modes%modes > 0) call note_shaft_modes(machine, self%modes, self%crossings, .false., self%notes)

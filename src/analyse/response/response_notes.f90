@@ -28,7 +28,7 @@ module nocdyn_response_notes
   private
 
   public :: note_simplifications, note_steady_states, note_separation, note_linear_ranges, note_overloads, note_rated_speeds, &
-    note_other_excitations, note_rules
+    note_measurements, note_other_excitations, note_rules
   public :: note_numbers, note_shaft_modes
 
 contains
@@ -333,6 +333,23 @@ contains
     call append(notes, 'the response is the one of ' // quoted(settings%shaker_name) // ' alone: the oscillations ' // &
                        'that other excitations add are left out')
   end subroutine note_other_excitations
+
+  !> Measured orders and peaks at speeds, which a response over the frequency of a shaker has not.
+  subroutine note_measurements(input, notes)
+    type(input_t), intent(in) :: input
+    type(string_t), allocatable, intent(inout) :: notes(:)
+    integer, allocatable :: groups(:)
+    integer :: i
+
+    allocate (groups, source=input%groups_named('measurement'))
+    do i = 1, size(groups)
+      associate (group => input%groups(groups(i)))
+        if (group%text('kind') /= 'order' .and. .not. (group%text('kind') == 'peak' .and. group%has_value('speed'))) cycle
+        call append(notes, 'the measurement ' // quoted(group%name) // ' at speeds is compared with nothing: the response ' // &
+                           'is over the frequency of a shaker')
+      end associate
+    end do
+  end subroutine note_measurements
 
   !> Rated speeds of the rule iacs_m68 that are far from the ones of the body of &response, to which they belong.
   subroutine note_rated_speeds(input, settings, notes)
