@@ -29,8 +29,8 @@ TIMES = np.linspace(0, 2, 1001)
 SIGNALS = ("omega_motor", "omega_fan", "total_moment_b")
 
 
-def exact(x):
-    """The signals by the eigenvalues of the linear machine: speeds and twists as states."""
+def system(x):
+    """The matrix of the linear machine: speeds and twists as states."""
     a, b, c, v, mid = x
     inertia = [2.0, mid, 3.0]
     matrix = np.zeros((5, 5), dtype=np.result_type(a, b, c, v, mid))  # omega motor, mid, fan, twists motor - mid, mid - fan
@@ -42,6 +42,12 @@ def exact(x):
         matrix[3 + first, first] = 1
         matrix[3 + first, first + 1] = -1
     matrix[2, 2] -= v / 3.0
+    return matrix
+
+
+def exact(x):
+    """The signals by the eigenvalues of the linear machine."""
+    b, matrix = x[1], system(x)
     values, vectors = np.linalg.eig(matrix)
     parts = np.linalg.solve(vectors, np.array([20 / 2.0, 0, 0, 0, 0], dtype=complex)) / values
     late = np.maximum(TIMES - 0.1, 0)
@@ -50,12 +56,9 @@ def exact(x):
     return np.array([states[0], states[2], moment])
 
 
-def optimum(measured, deviations, start):
+def optimum(residuals, start):
     """Gauss-Newton with central differences of the exact solution."""
     x = np.array(start)
-
-    def residuals(x):
-        return ((exact(x).real - measured) / deviations[:, None]).ravel()
 
     for _ in range(30):
         r = residuals(x)
@@ -101,7 +104,7 @@ def test_the_optimum_is_that_of_an_independent_least_squares(nocdyn):
     wide = {key: f"low = {0.5 * value} high = {2 * value}" for key, value in TRUE.items()}
     report, printed = fit(nocdyn, MACHINE.format(**START) + text + unknowns(**{key: wide[key] for key in PATHS}))
     assert report["has_converged"]
-    best, covariance = optimum(measured, deviations, [TRUE[key] for key in PATHS])
+    best, covariance = optimum(lambda x: ((exact(x).real - measured) / deviations[:, None]).ravel(), [TRUE[key] for key in PATHS])
     freedoms = measured.size - len(PATHS)
     factor = report["sum_of_squares"] / freedoms
     for k, one in enumerate(report["unknowns"]):
@@ -117,6 +120,57 @@ def test_the_optimum_is_that_of_an_independent_least_squares(nocdyn):
     again = {m["name"]: m for m in nocdyn.summary("again")["measurements"]}
     for measurement in report["measurements"]:
         assert again[measurement["name"]]["spread"] == pytest.approx(measurement["spread"], rel=1e-4)
+
+
+@pytest.mark.parametrize("deviation", [None, 0.002])
+def test_frequencies_and_damping_ratios_are_fitted_together(nocdyn, deviation):
+    """Two modes have four numbers; without a deviation of its own, a damping ratio is as exact as a relative frequency."""
+    lowest = 20  # [rad/s], above the rigid body's rate
+
+    def modes(x):
+        values = np.sort_complex(np.array([one for one in np.linalg.eigvals(system(x)) if one.imag > lowest]) * -1j) * 1j
+        return values.imag, -values.real / np.abs(values)
+
+    frequencies, dampings = modes([TRUE[key] for key in PATHS])
+    frequencies, dampings = frequencies * [1.004, 0.997], dampings * [1.15, 0.9]
+    keys = f"damping_deviation = {deviation}" if deviation else ""
+    text = (
+        f"&measurement name = 'impact' kind = 'frequency' frequency = {', '.join(map(repr, frequencies.tolist()))}\n"
+        f"  relative_damping = {', '.join(map(repr, dampings.tolist()))} deviation = 0.004 {keys} /\n"
+    )
+    names = ("a", "c", "mid")
+    wide = {key: f"low = {0.5 * TRUE[key]} high = {2 * TRUE[key]}" for key in names}
+    report, printed = fit(nocdyn, MACHINE.format(**TRUE) + text + unknowns(**wide))
+    assert report["values"] == 4
+
+    def residuals(some):
+        found = modes([dict(zip(names, some)).get(key, value) for key, value in zip(PATHS, (TRUE[key] for key in PATHS))])
+        relative = (found[0] - frequencies) / frequencies / 0.004
+        return np.concatenate([relative, (found[1] - dampings) / (deviation or 0.004)])
+
+    best, covariance = optimum(residuals, [TRUE[key] for key in names])
+    factor = report["sum_of_squares"] / (4 - len(names))
+    for k, one in enumerate(report["unknowns"]):
+        error = np.sqrt(covariance[k, k])
+        assert abs(one["fitted"] - best[k]) <= 1e-5 * error, one["target"]
+        assert one["standard_error"] == pytest.approx(np.sqrt(factor) * error, rel=1e-4)
+    (member,) = report["measurements"]
+    difference = modes([dict(zip(names, best)).get(key, TRUE[key]) for key in PATHS])[1] - dampings
+    assert member["damping_bias"] == pytest.approx(difference.mean(), rel=1e-3, abs=1e-6)
+    assert "impact, damping ratios" in printed
+
+
+def test_values_before_and_after_are_written(nocdyn):
+    text, measured, _ = record(nocdyn)
+    report, _ = fit(nocdyn, MACHINE.format(**START) + text + unknowns(a="low = 1000 high = 4000"))
+    assert [one["file"] for one in report["measurements"]] == [f"fit_m_{signal}.csv" for signal in SIGNALS]
+    table = np.genfromtxt(nocdyn.folder / "out/fit_m_omega_fan.csv", delimiter=",", names=True, deletechars="")
+    assert table.dtype.names == ("t_[s]", *(f"{word}_[rad/s]" for word in ("measured", "before", "computed", "difference")))
+    assert table["measured_[rad/s]"] == pytest.approx(measured[1])
+    before = exact([START[key] for key in PATHS]).real[1]
+    after = exact([report["unknowns"][0]["fitted"], *(START[key] for key in list(PATHS)[1:])]).real[1]
+    assert table["before_[rad/s]"] == pytest.approx(before, abs=1e-7)
+    assert table["computed_[rad/s]"] == pytest.approx(after, abs=1e-7)
 
 
 GEARED = MACHINE + (

@@ -168,6 +168,21 @@ def test_frequencies_are_paired_with_the_nearest_modes(nocdyn):
     assert rows[0, 0] == 1 and rows[0, 2] == pytest.approx(2 * math.pi * float(mode["frequency [Hz]"]))
     assert rows[0, labels.index("computed_damping [1]")] == pytest.approx(float(mode["damping_ratio"]))
     assert "measured f: computed 122.4" in outcome.stdout
+    damping = float(mode["damping_ratio"])
+    assert f"measured f, damping ratios: computed {damping:.6g}"[:48] in outcome.stdout
+    (one,) = json.loads((nocdyn.folder / "out/modes.json").read_text())["measurements"]
+    assert one["damping_bias"] == pytest.approx(damping - 0.02)
+
+
+def test_a_response_over_the_frequency_says_what_it_does_not_compare(nocdyn):
+    shaker = "&excitation name = 's' body = 'a' amplitude = 1 frequency_hz = 5 /\n"
+    groups = "&measurement name = 'o' kind = 'order' order = 1 signal = 'total_moment_c' speeds = 50 values = 1 /\n"
+    groups += "&measurement name = 'p' kind = 'peak' signal = 'total_moment_c' values = 1 /\n"  # of a run
+    machine = "".join(line for line in FORCED.splitlines(keepends=True) if not line.startswith(("&response", "&excitation")))
+    nocdyn.write("m.nml", machine + shaker + "&response body = 'a' frequency_hz = 5, 40 count = 9 /\n" + groups)
+    outcome = nocdyn("response", "m.nml", "--out", "out")
+    assert outcome.returncode == 0, outcome.stderr
+    assert "the measurement 'o' at speeds is compared with nothing" in outcome.stdout and "'p'" not in outcome.stdout
 
 
 @pytest.mark.parametrize("has_pulses", [False, True])
@@ -308,6 +323,7 @@ def test_what_is_wrong_with_an_order_is_named(nocdyn, groups, words):
         ("frequency_hz = 19, 40 relative_damping = 0.1", "relative_damping has 1 values and frequency has 2"),
         ("frequency_hz = 19 modes = 3", "modes: there is no oscillating mode 3; allowed: 1 to 1"),
         ("relative_damping = 0.1", "frequency is missing"),
+        ("frequency_hz = 19 damping_deviation = 0.01", "damping_deviation needs relative_damping"),
     ],
 )
 def test_what_is_wrong_with_frequencies_is_named(nocdyn, groups, words):

@@ -14,12 +14,11 @@ module nocdyn_fit_comparisons
   use nocdyn_measured_responses, only: compare_responses
   use nocdyn_measured_runs, only: find_delays, new_run_samples, run_samples_t, sample_run
   use nocdyn_measurements, only: measured_frequency, measured_order, measured_peak, measured_series, measurement_t
-  use nocdyn_modes, only: mode_oscillating, mode_t
+  use nocdyn_modes, only: list_oscillations, mode_t
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_settings, only: read_response_settings, response_settings_t
   use nocdyn_text, only: string_t
   use nocdyn_transient, only: build_formulation
-  use nocdyn_units, only: in_si, unit_hz
   use nocdyn_wanted_modes, only: modes_choice_t
   implicit none (type, external)
   private
@@ -113,21 +112,15 @@ contains
     type(machine_t) :: machine
     type(mode_t), allocatable :: modes(:)
     type(operating_point_t) :: point
-    integer, allocatable :: chosen(:), numbers(:)
-    integer :: i, none(0)
+    integer, allocatable :: numbers(:)
+    integer :: none(0)
     real(wp), allocatable :: dampings(:), frequencies(:)
 
     call assemble_steady_machine(input, .false., machine, error)
     if (.not. allocated(error)) call find_operating_point(input, machine, 'equilibrium', point, error)
     if (.not. allocated(error)) call find_machine_modes(point, modes_choice_t(), none, linear, modes, error)
     if (allocated(error)) return
-    allocate (chosen, source=pack([(i, i=1, size(modes))], modes%kind == mode_oscillating))
-    allocate (numbers(size(chosen)), frequencies(size(chosen)), dampings(size(chosen)))
-    do i = 1, size(chosen)
-      numbers(i) = modes(chosen(i))%number
-      frequencies(i) = in_si(modes(chosen(i))%frequency(), unit_hz)
-      dampings(i) = modes(chosen(i))%damping_ratio()
-    end do
+    call list_oscillations(modes, numbers, frequencies, dampings)
     call compare_modes(input, numbers, frequencies, dampings, some, error)
     if (.not. allocated(error)) call put_back(measurements%kind == measured_frequency, some, comparisons)
   end subroutine compare_frequencies

@@ -1,7 +1,7 @@
 !> What a fit has found: values with standard errors, correlations, what cannot be told apart, and the measurements before and
 !> after.
 module nocdyn_fit_report
-  use nocdyn_comparisons, only: comparison_t
+  use nocdyn_comparisons, only: comparison_file, comparison_t, fit_files, of_damping, put_measurement
   use nocdyn_csv, only: text_cell
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -162,15 +162,29 @@ contains
         call report%append_line(line)
       end associate
     end do
-    width = maxval([11, (len(self%after(i)%measurement%name), i=1, size(self%after))])
+    width = maxval([11, (len(self%after(i)%measurement%name) + len(', damping ratios'), i=1, size(self%after))])
     call report%append_line('  ' // padded('measurement', width) // cell('bias before') // cell('bias after') // &
                             cell('spread before') // cell('spread after') // cell('correlation'))
     do i = 1, size(self%after)
-      call report%append_line('  ' // padded(self%after(i)%measurement%name, width) // cell(self%before(i)%bias) // &
-                              cell(self%after(i)%bias) // cell(self%before(i)%spread) // cell(self%after(i)%spread) // &
-                              cell(self%after(i)%correlation) // '  ' // self%after(i)%measurement%unit)
+      call report%append_line(line_on(self%before(i), self%after(i)))
+      if (allocated(self%after(i)%measured_damping)) then
+        call report%append_line(line_on(of_damping(self%before(i)), of_damping(self%after(i))))
+      end if
     end do
     text = report%text()
+
+  contains
+
+    !> A measurement before and after.
+    function line_on(before, after) result(line)
+      type(comparison_t), intent(in) :: before, after
+      character(len=:), allocatable :: line
+
+      line = '  ' // padded(after%measurement%name, width) // cell(before%bias) // cell(after%bias) // cell(before%spread) // &
+             cell(after%spread) // cell(after%correlation)
+      if (after%measurement%unit /= '1') line = line // '  ' // after%measurement%unit
+    end function line_on
+
   end function fit_text
 
   !> Writes fit.csv: a row for each unknown.
@@ -211,6 +225,7 @@ contains
     type(json_t), intent(inout) :: json
     type(input_t), intent(in) :: input
     type(machine_fit_t), intent(in) :: self
+    type(comparison_t) :: after, before   ! of damping ratios
     integer :: i
 
     call json%open_report(input%file, input%title())
@@ -242,14 +257,23 @@ contains
     call json%open_list('measurements')
     do i = 1, size(self%after)
       call json%open()
-      call json%put('name', self%after(i)%measurement%name)
-      call json%put('unit', self%after(i)%measurement%unit)
+      call put_measurement(json, self%after(i)%measurement)
+      call json%put('file', comparison_file(self%after(i), fit_files))
+      if (self%after(i)%measurement%deviation > 0) call json%put('deviation', self%after(i)%measurement%deviation)
       call json%put('values', size(self%after(i)%measured))
       call json%put('bias_before', self%before(i)%bias)
       call json%put('bias', self%after(i)%bias)
       call json%put('spread_before', self%before(i)%spread)
       call json%put('spread', self%after(i)%spread)
       if (self%after(i)%has_correlation) call json%put('correlation', self%after(i)%correlation)
+      before = of_damping(self%before(i))
+      after = of_damping(self%after(i))
+      if (size(after%measured) > 0) then
+        call json%put('damping_bias_before', before%bias)
+        call json%put('damping_bias', after%bias)
+        call json%put('damping_spread_before', before%spread)
+        call json%put('damping_spread', after%spread)
+      end if
       call json%close()
     end do
     call json%close_list()

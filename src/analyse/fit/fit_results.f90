@@ -1,6 +1,8 @@
-!> Numbers that are fitted to measurements, as an analysis: fit.csv, fit.json, and fitted.nml, the input with what was found.
+!> Numbers that are fitted to measurements, as an analysis: fit.csv, fit.json, and fitted.nml, the input with what was
+!> found; fit_NAME.csv with the values of each measurement before and after.
 module nocdyn_fit_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
+  use nocdyn_comparisons, only: append_comparison_files, fit_files, put_comparison_table
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fit_problem, only: fit_problem_t, new_fit_problem
   use nocdyn_fit_report, only: fit_csv, machine_fit_t, fit_text, put_fit
@@ -115,6 +117,7 @@ contains
     allocate (names(0))
     call append(names, input_name)
     call append(names, table_name)
+    call append_comparison_files(self%fit%after, fit_files, names)
   end subroutine list_tables
 
   subroutine put_table(self, input, name, file)
@@ -125,8 +128,10 @@ contains
 
     if (name == input_name) then
       call file%put(input_text(self%fitted))
-    else
+    else if (name == table_name) then
       call fit_csv(self%fit, file)
+    else
+      call put_comparison_table(self%fit%after, name, file, self%fit%before)
     end if
   end subroutine put_table
 

@@ -13,7 +13,10 @@ module nocdyn_comparisons
   implicit none (type, external)
   private
 
-  public :: comparison_file, new_comparison, put_comparison_csv, put_comparisons, write_comparisons
+  public :: append_comparison_files, comparison_file, new_comparison, of_damping, put_comparison_table, put_comparisons, &
+    put_measurement, write_comparisons
+
+  character(len=*), parameter, public :: measured_files = 'measured_', fit_files = 'fit_'   !! names begin with
 
   !> What was measured and computed at the same abscissae; differences are computed less measured.
   type, public :: comparison_t
@@ -36,13 +39,20 @@ module nocdyn_comparisons
 contains
 
   !> Weighted differences for a fit: computed less measured, over the standard deviation if that is known. Frequencies are
-  !> compared relatively.
+  !> compared relatively; damping ratios follow them.
   pure function residuals(self)
     class(comparison_t), intent(in) :: self
-    real(wp) :: residuals(size(self%measured))
+    real(wp), allocatable :: residuals(:)
+    integer :: dampings, n
 
-    residuals = (self%computed - self%measured) * self%measurement%weight()
-    if (self%measurement%kind == measured_frequency) residuals = residuals / self%measured
+    n = size(self%measured)
+    dampings = 0
+    if (allocated(self%measured_damping)) dampings = size(self%measured_damping)
+    allocate (residuals(n + dampings))
+    residuals(:n) = (self%computed - self%measured) * self%measurement%weight()
+    if (self%measurement%kind == measured_frequency) residuals(:n) = residuals(:n) / self%measured
+    if (dampings == 0) return
+    residuals(n + 1:) = (self%computed_damping - self%measured_damping) * self%measurement%damping_weight()
   end function residuals
 
   !> Compares values at the same abscissae.
@@ -72,62 +82,141 @@ contains
     end if
   end function new_comparison
 
+  !> The damping ratios of frequencies as a comparison of their own; of no values if none was measured.
+  type(comparison_t) function of_damping(frequencies) result(self)
+    type(comparison_t), intent(in) :: frequencies
+    type(measurement_t) :: m
+    integer :: none(0)
+
+    m = frequencies%measurement
+    m%name = m%name // ', damping ratios'
+    m%unit = '1'
+    if (allocated(frequencies%measured_damping)) then
+      self = new_comparison(m, frequencies%abscissa, frequencies%measured_damping, frequencies%computed_damping)
+    else
+      self = new_comparison(m, real(none, wp), real(none, wp), real(none, wp))
+    end if
+  end function of_damping
+
   !> Name of the file with the values of a comparison.
-  pure function comparison_file(comparison) result(name)
+  pure function comparison_file(comparison, prefix) result(name)
     type(comparison_t), intent(in) :: comparison
+    character(len=*), intent(in) :: prefix   !! `measured_files` ...
     character(len=:), allocatable :: name
     integer :: i
 
-    name = 'measured_' // comparison%measurement%name // '.csv'
+    name = prefix // comparison%measurement%name // '.csv'
     do i = 1, len(name)
       if (name(i:i) == '/') name(i:i) = '_'
     end do
   end function comparison_file
 
-  !> Writes that file: abscissa, measured, computed, difference.
-  subroutine put_comparison_csv(comparison, file)
-    type(comparison_t), intent(in) :: comparison
-    type(output_file_t), intent(inout) :: file
-    type(string_t), allocatable :: labels(:)
+  !> Appends the names of the files of all comparisons.
+  subroutine append_comparison_files(comparisons, prefix, names)
+    type(comparison_t), intent(in) :: comparisons(:)
+    character(len=*), intent(in) :: prefix   !! `measured_files` ...
+    type(string_t), allocatable, intent(inout) :: names(:)
     integer :: i
 
+    do i = 1, size(comparisons)
+      call append(names, comparison_file(comparisons(i), prefix))
+    end do
+  end subroutine append_comparison_files
+
+  !> Writes the file with a name, if it is that of a comparison: abscissa, measured and computed values, differences. Of a fit the
+  !> values before it stand in between.
+  subroutine put_comparison_table(comparisons, name, file, before)
+    type(comparison_t), intent(in) :: comparisons(:)
+    character(len=*), intent(in) :: name
+    type(output_file_t), intent(inout) :: file
+    type(comparison_t), intent(in), optional :: before(:)   !! of a fit, [comparisons]
+    integer :: i
+
+    do i = 1, size(comparisons)
+      if (present(before)) then
+        if (name == comparison_file(comparisons(i), fit_files)) call put_rows(comparisons(i), file, before(i))
+      else
+        if (name == comparison_file(comparisons(i), measured_files)) call put_rows(comparisons(i), file)
+      end if
+    end do
+  end subroutine put_comparison_table
+
+  subroutine put_rows(comparison, file, before)
+    type(comparison_t), intent(in) :: comparison
+    type(output_file_t), intent(inout) :: file
+    type(comparison_t), intent(in), optional :: before
+    type(string_t), allocatable :: labels(:)
+    real(wp) :: columns(size(comparison%measured), 8)
+    integer :: i, n
+
+    allocate (labels(0))
+    n = 0
     associate (m => comparison%measurement)
-      allocate (labels(0))
       select case (m%kind)
       case (measured_series)
-        call append(labels, 't [s]')
+        call add('t [s]', comparison%abscissa)
       case (measured_order)
-        call append(labels, 'speed [rad/s]')
+        call add('speed [rad/s]', comparison%abscissa)
       case (measured_frequency)
-        call append(labels, 'mode [1]')
+        call add('mode [1]', comparison%abscissa)
       case default
-        call append(labels, trim(merge('speed [rad/s]', 'number [1]   ', abs(m%speed) > 0.0_wp)))
+        call add(trim(merge('speed [rad/s]', 'number [1]   ', abs(m%speed) > 0.0_wp)), comparison%abscissa)
       end select
-      call append(labels, 'measured [' // m%unit // ']')
-      call append(labels, 'computed [' // m%unit // ']')
-      call append(labels, 'difference [' // m%unit // ']')
+      call add('measured [' // m%unit // ']', comparison%measured)
+      if (has_before(size(comparison%measured))) call add('before [' // m%unit // ']', before%computed)
+      call add('computed [' // m%unit // ']', comparison%computed)
+      call add('difference [' // m%unit // ']', comparison%computed - comparison%measured)
       if (allocated(comparison%computed_damping)) then
-        call append(labels, 'measured_damping [1]')
-        call append(labels, 'computed_damping [1]')
+        call add('measured_damping [1]', comparison%measured_damping)
+        if (has_before(size(comparison%measured))) call add('before_damping [1]', before%computed_damping)
+        call add('computed_damping [1]', comparison%computed_damping)
       end if
-      call write_header(file, labels)
-      do i = 1, size(comparison%measured)
-        if (allocated(comparison%computed_damping)) then
-          call write_row(file, [comparison%abscissa(i), comparison%measured(i), comparison%computed(i), &
-                                comparison%computed(i) - comparison%measured(i), comparison%measured_damping(i), &
-                                comparison%computed_damping(i)])
-        else
-          call write_row(file, [comparison%abscissa(i), comparison%measured(i), comparison%computed(i), &
-                                comparison%computed(i) - comparison%measured(i)])
-        end if
-      end do
     end associate
-  end subroutine put_comparison_csv
+    call write_header(file, labels)
+    do i = 1, size(columns, 1)
+      call write_row(file, columns(i, :n))
+    end do
+
+  contains
+
+    !> Whether the same values were compared before; other modes may be found then.
+    logical function has_before(values)
+      integer, intent(in) :: values
+
+      has_before = present(before)
+      if (has_before) has_before = size(before%computed) == values
+    end function has_before
+
+    subroutine add(label, values)
+      character(len=*), intent(in) :: label
+      real(wp), intent(in) :: values(:)
+
+      n = n + 1
+      call append(labels, label)
+      columns(:, n) = values
+    end subroutine add
+
+  end subroutine put_rows
+
+  !> Writes members of an open object: what was measured.
+  subroutine put_measurement(json, m)
+    type(json_t), intent(inout) :: json
+    type(measurement_t), intent(in) :: m
+
+    call json%put('name', m%name)
+    call json%put('kind', trim(measured_kinds(m%kind)))
+    if (m%kind /= measured_frequency) call json%put('signal', m%signal_name)
+    if (m%kind == measured_peak) call json%put('statistic', trim(peak_names(m%statistic)))
+    if (m%kind == measured_order) call json%put('order', m%order)
+    call json%put('unit', m%unit)
+    call json%put('caption', m%caption)
+  end subroutine put_measurement
 
   !> Writes the list `measurements` of a report.
   subroutine put_comparisons(json, comparisons)
     type(json_t), intent(inout) :: json
     type(comparison_t), intent(in) :: comparisons(:)
+    type(comparison_t) :: damping
     integer :: i
 
     if (size(comparisons) == 0) return
@@ -135,14 +224,8 @@ contains
     do i = 1, size(comparisons)
       associate (one => comparisons(i), m => comparisons(i)%measurement)
         call json%open()
-        call json%put('name', m%name)
-        call json%put('kind', trim(measured_kinds(m%kind)))
-        if (m%kind /= measured_frequency) call json%put('signal', m%signal_name)
-        if (m%kind == measured_peak) call json%put('statistic', trim(peak_names(m%statistic)))
-        if (m%kind == measured_order) call json%put('order', m%order)
-        call json%put('unit', m%unit)
-        call json%put('caption', m%caption)
-        call json%put('file', comparison_file(one))
+        call put_measurement(json, m)
+        call json%put('file', comparison_file(one, measured_files))
         call json%put('values', size(one%measured))
         call json%put('outside', one%outside)
         call json%put('gaps', m%gaps)
@@ -158,6 +241,11 @@ contains
           if (one%has_correlation) call json%put('correlation', one%correlation)
           call json%put('largest_difference', one%largest)
           call json%put('largest_difference_at', one%largest_at)
+        end if
+        damping = of_damping(one)
+        if (size(damping%measured) > 0) then
+          call json%put('damping_bias', damping%bias)
+          call json%put('damping_spread', damping%spread)
         end if
         if (m%kind == measured_series .and. size(one%measured) > 1) then
           call json%put('half_range_measured', 0.5_wp * (maxval(one%measured) - minval(one%measured)))
@@ -178,28 +266,9 @@ contains
 
     do i = 1, size(comparisons)
       associate (one => comparisons(i), m => comparisons(i)%measurement)
-        line = 'measured ' // m%name
-        if (m%kind == measured_peak) line = line // ', ' // trim(peak_names(m%statistic)) // ' of'
-        if (m%kind == measured_order) line = line // ', order ' // to_text(m%order) // ' of'
-        if (m%kind /= measured_frequency) line = line // ' ' // m%signal_name
-        if (size(one%measured) == 0) then
-          call text%append_line(line // ': none of its values is where something was computed')
-          cycle
-        end if
-        if (size(one%measured) == 1) then
-          call text%append_line(line // ': computed ' // shown(one%computed(1)) // ', measured ' // shown(one%measured(1)) // &
-                                ' ' // m%unit // ', difference ' // shown(one%largest) // ' (' // &
-                                rounded_text(100.0_wp * one%largest / nonzero(one%measured(1)), 3) // ' %)')
-          cycle
-        end if
-        line = line // ': ' // counted(size(one%measured), 'value', 'values') // ', bias ' // shown(one%bias) // &
-               ', spread ' // shown(one%spread) // ' ' // m%unit
-        if (one%has_correlation) line = line // ', correlation ' // rounded_text(one%correlation, 3)
-        line = line // ', largest difference ' // shown(one%largest)
-        if (m%kind == measured_series) line = line // ' at t = ' // shown(one%largest_at) // ' s'
-        if (m%kind == measured_order) line = line // ' at ' // shown(one%largest_at) // ' rad/s'
-        if (m%kind == measured_frequency) line = line // ' of mode ' // shown(one%largest_at)
-        call text%append_line(line)
+        call text%append_line(line_on(one))
+        if (allocated(one%measured_damping) .and. size(one%measured) > 0) call text%append_line(line_on(of_damping(one)))
+        if (size(one%measured) < 2) cycle
         line = '  its clock: delay = ' // rounded_text(one%delay, 6) // ' s found by correlation, ' // &
                rounded_text(one%clock_correlation, 3)
         if (m%drifts) line = line // '; drifts by ' // rounded_text(m%drift(1), 3) // ' to ' // &
@@ -210,6 +279,38 @@ contains
                                                                    ' gaps of the file')
       end associate
     end do
+  end subroutine write_comparisons
+
+  !> As "measured gauge total_moment_shaft: 301 values, bias 0.31, spread 0.19 N m, ...".
+  function line_on(one) result(line)
+    type(comparison_t), intent(in) :: one
+    character(len=:), allocatable :: line, unit
+
+    associate (m => one%measurement)
+      unit = ' ' // m%unit
+      if (m%unit == '1') unit = ''
+      line = 'measured ' // m%name
+      if (m%kind == measured_peak) line = line // ', ' // trim(peak_names(m%statistic)) // ' of'
+      if (m%kind == measured_order) line = line // ', order ' // to_text(m%order) // ' of'
+      if (m%kind /= measured_frequency) line = line // ' ' // m%signal_name
+      if (size(one%measured) == 0) then
+        line = line // ': none of its values is where something was computed'
+        return
+      end if
+      if (size(one%measured) == 1) then
+        line = line // ': computed ' // shown(one%computed(1)) // ', measured ' // shown(one%measured(1)) // &
+               unit // ', difference ' // shown(one%largest) // ' (' // &
+               rounded_text(100.0_wp * one%largest / nonzero(one%measured(1)), 3) // ' %)'
+        return
+      end if
+      line = line // ': ' // counted(size(one%measured), 'value', 'values') // ', bias ' // shown(one%bias) // &
+             ', spread ' // shown(one%spread) // unit
+      if (one%has_correlation) line = line // ', correlation ' // rounded_text(one%correlation, 3)
+      line = line // ', largest difference ' // shown(one%largest)
+      if (m%kind == measured_series) line = line // ' at t = ' // shown(one%largest_at) // ' s'
+      if (m%kind == measured_order) line = line // ' at ' // shown(one%largest_at) // ' rad/s'
+      if (m%kind == measured_frequency) line = line // ' of mode ' // shown(one%largest_at)
+    end associate
 
   contains
 
@@ -226,6 +327,6 @@ contains
       nonzero = sign(max(abs(value), tiny(value)), value)
     end function nonzero
 
-  end subroutine write_comparisons
+  end function line_on
 
 end module nocdyn_comparisons

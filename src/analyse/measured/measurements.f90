@@ -40,11 +40,12 @@ module nocdyn_measurements
     real(wp) :: from = -huge(1.0_wp), until = huge(1.0_wp)   !! times of the run [s], or speeds [rad/s]
     real(wp) :: order = 0.0_wp               !! oscillations per turn of the body of &response
     real(wp), allocatable :: damping(:)      !! damping ratios of the frequencies; may be empty
+    real(wp) :: damping_deviation = 0.0_wp   !! standard deviation of these; 0: unknown
     integer, allocatable :: modes(:)         !! numbers of their modes; may be empty
     integer :: statistic = peak_half_range   !! of a peak
     real(wp) :: speed = 0.0_wp               !! at which a peak was measured [rad/s]; 0: anywhere
   contains
-    procedure :: weight
+    procedure :: damping_weight, weight
   end type measurement_t
 
 contains
@@ -56,6 +57,16 @@ contains
     weight = 1.0_wp
     if (self%deviation > 0.0_wp) weight = 1.0_wp / self%deviation
   end function weight
+
+  !> The weight of differences of damping ratios. If their deviation is not given it is the relative one of the frequencies: a
+  !> decaying oscillation in noise tells the real and the imaginary part of its eigenvalue equally well, for the derivatives of
+  !> exp(lambda t) by both are t exp(lambda t) and i t exp(lambda t); over the frequency these are damping ratio and frequency.
+  pure real(wp) function damping_weight(self) result(weight)
+    class(measurement_t), intent(in) :: self
+
+    weight = self%weight()
+    if (self%damping_deviation > 0.0_wp) weight = 1.0_wp / self%damping_deviation
+  end function damping_weight
 
   !> Reads the measurements of some kinds, but for series without a signal.
   subroutine read_measurements(input, kinds, signals, list, error)
@@ -213,6 +224,7 @@ contains
         allocate (self%abscissa(0))
         self%values = group%numbers('frequency')
         self%damping = group%numbers('relative_damping')
+        self%damping_deviation = group%number('damping_deviation', absent=0.0_wp)
         self%modes = group%whole_numbers('modes')
         call check_count('relative_damping', size(self%damping))
         call check_count('modes', size(self%modes))

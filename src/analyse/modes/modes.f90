@@ -8,7 +8,7 @@ module nocdyn_modes
   implicit none (type, external)
   private
 
-  public :: fill_bodies, fill_mode, find_modes, sort_modes
+  public :: fill_bodies, fill_mode, find_modes, list_oscillations, sort_modes
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 
@@ -39,6 +39,26 @@ module nocdyn_modes
   end type mode_t
 
 contains
+
+  !> What is compared with measured frequencies: those modes that oscillate.
+  pure subroutine list_oscillations(modes, numbers, frequencies, dampings)
+    type(mode_t), intent(in) :: modes(:)
+    integer, allocatable, intent(out) :: numbers(:)        !! [oscillating modes]
+    real(wp), allocatable, intent(out) :: frequencies(:)   !! damped [rad/s]
+    real(wp), allocatable, intent(out) :: dampings(:)      !! damping ratios
+    integer :: i, k, n
+
+    n = count(modes%kind == mode_oscillating)
+    allocate (numbers(n), frequencies(n), dampings(n))
+    k = 0
+    do i = 1, size(modes)
+      if (modes(i)%kind /= mode_oscillating) cycle
+      k = k + 1
+      numbers(k) = modes(i)%number
+      frequencies(k) = aimag(modes(i)%eigenvalue)
+      dampings(k) = modes(i)%damping_ratio()
+    end do
+  end subroutine list_oscillations
 
   !> Computes the modes, in this order: rigid motions, oscillations by frequency, real eigenvalues by absolute value.
   subroutine find_modes(formulation, linear, elastic, modes, error)

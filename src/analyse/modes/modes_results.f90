@@ -2,7 +2,7 @@
 module nocdyn_modes_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_assembly, only: assemble_steady_machine
-  use nocdyn_comparisons, only: comparison_file, comparison_t, put_comparison_csv, write_comparisons
+  use nocdyn_comparisons, only: append_comparison_files, comparison_t, measured_files, put_comparison_table, write_comparisons
   use nocdyn_errors, only: error_t, exit_failed
   use nocdyn_holzer_report, only: holzer_tables
   use nocdyn_input, only: input_t
@@ -11,7 +11,7 @@ module nocdyn_modes_results
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_measured_modes, only: compare_modes
-  use nocdyn_modes, only: mode_oscillating
+  use nocdyn_modes, only: list_oscillations
   use nocdyn_modes_files, only: put_modes, write_modes
   use nocdyn_modes_report, only: modes_report_t, modes_text, new_modes_report
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
@@ -65,18 +65,9 @@ contains
     type(input_t), intent(in) :: input
     type(error_t), allocatable, intent(out) :: error
     real(wp), allocatable :: dampings(:), frequencies(:)
-    integer, allocatable :: chosen(:), numbers(:)
-    integer :: i
+    integer, allocatable :: numbers(:)
 
-    associate (modes => self%report%modes)
-      allocate (chosen, source=pack([(i, i=1, size(modes))], modes%kind == mode_oscillating))
-      allocate (frequencies, source=aimag(modes(chosen)%eigenvalue))
-      allocate (dampings(size(chosen)), numbers(size(chosen)))
-    end associate
-    do i = 1, size(chosen)
-      dampings(i) = self%report%modes(chosen(i))%damping_ratio()
-      numbers(i) = self%report%modes(chosen(i))%number
-    end do
+    call list_oscillations(self%report%modes, numbers, frequencies, dampings)
     call compare_modes(input, numbers, frequencies, dampings, self%comparisons, error)
   end subroutine compare_measured
 
@@ -111,14 +102,11 @@ contains
   subroutine list_tables(self, names)
     class(modes_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
-    integer :: i
 
     allocate (names(0))
     if (allocated(self%holzer_csv)) call append(names, holzer_name)
     call append(names, table_name)
-    do i = 1, size(self%comparisons)
-      call append(names, comparison_file(self%comparisons(i)))
-    end do
+    call append_comparison_files(self%comparisons, measured_files, names)
   end subroutine list_tables
 
   subroutine put_table(self, input, name, file)
@@ -126,16 +114,13 @@ contains
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
-    integer :: i
 
     if (name == holzer_name) then
       call file%put(self%holzer_csv)
     else if (name == table_name) then
       call write_modes(file, self%report)
     else
-      do i = 1, size(self%comparisons)
-        if (name == comparison_file(self%comparisons(i))) call put_comparison_csv(self%comparisons(i), file)
-      end do
+      call put_comparison_table(self%comparisons, name, file)
     end if
   end subroutine put_table
 

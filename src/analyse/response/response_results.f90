@@ -1,7 +1,7 @@
 !> The forced response by orders over the speed, as an analysis: response.csv, response_orders.csv and response.json.
 module nocdyn_response_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
-  use nocdyn_comparisons, only: comparison_file, put_comparison_csv, put_comparisons
+  use nocdyn_comparisons, only: append_comparison_files, measured_files, put_comparison_table, put_comparisons
   use nocdyn_errors, only: error_t
   use nocdyn_grid_file, only: grid_file_t
   use nocdyn_input, only: input_t
@@ -16,7 +16,7 @@ module nocdyn_response_results
   use nocdyn_response_report, only: response_text
   use nocdyn_response_summary, only: response_summary_t, summarise_response
   use nocdyn_response_verdict, only: find_response_verdict
-  use nocdyn_text, only: append, string_t
+  use nocdyn_text, only: string_t
   implicit none (type, external)
   private
 
@@ -49,14 +49,10 @@ contains
   subroutine list_tables(self, names)
     class(response_results_t), intent(in) :: self
     type(string_t), allocatable, intent(out) :: names(:)
-    integer :: i
 
     names = [string_t(columns_name)]
     if (.not. self%analysis%writes_grid) names = [string_t(response_table), string_t(orders_table), string_t(columns_name)]
-    if (.not. allocated(self%analysis%comparisons)) return
-    do i = 1, size(self%analysis%comparisons)
-      call append(names, comparison_file(self%analysis%comparisons(i)))
-    end do
+    if (allocated(self%analysis%comparisons)) call append_comparison_files(self%analysis%comparisons, measured_files, names)
   end subroutine list_tables
 
   pure function grid_name(self, input) result(name)
@@ -91,7 +87,6 @@ contains
     type(input_t), intent(in) :: input
     character(len=*), intent(in) :: name
     type(output_file_t), intent(inout) :: file
-    integer :: i
 
     select case (name)
     case (response_table)
@@ -101,9 +96,7 @@ contains
     case (columns_name)
       call file%put(response_columns_json(self%analysis, output_units(input)))
     case default
-      do i = 1, size(self%analysis%comparisons)
-        if (name == comparison_file(self%analysis%comparisons(i))) call put_comparison_csv(self%analysis%comparisons(i), file)
-      end do
+      call put_comparison_table(self%analysis%comparisons, name, file)
     end select
   end subroutine put_table
 

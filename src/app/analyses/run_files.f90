@@ -2,7 +2,7 @@
 !> &fatigue. A run that fails leaves trajectory.partial.csv and cycles.partial.csv.
 module nocdyn_run_files
   use nocdyn_column_lists, only: columns_file
-  use nocdyn_comparisons, only: comparison_file, put_comparison_csv
+  use nocdyn_comparisons, only: append_comparison_files, measured_files, put_comparison_table
   use nocdyn_console, only: new_status_line, status_line_t
   use nocdyn_csv_grid, only: csv_grid_t
   use nocdyn_disk_room, only: check_room
@@ -116,16 +116,14 @@ contains
     call append(names, columns_file)
     if (size(summary%fatigue%items) > 0) call append(names, trim(cycles_names(state_of(summary))))
     first = size(names)
-    do i = 1, size(summary%comparisons)
-      call append(names, comparison_file(summary%comparisons(i)))
-    end do
+    call append_comparison_files(summary%comparisons, measured_files, names)
     call append(names, summary_file)
     call files%open(writer%folder, names)
     call files%files(1)%put(input_text(input))
     call files%files(2)%put(columns_json(summary, trim(trajectory_names(state_of(summary), writer%form))))
     if (size(summary%fatigue%items) > 0) call put_cycles_csv(summary%fatigue, files%files(3))
-    do i = 1, size(summary%comparisons)
-      call put_comparison_csv(summary%comparisons(i), files%files(first + i))
+    do i = first + 1, size(names) - 1
+      call put_comparison_table(summary%comparisons, names(i)%text, files%files(i))
     end do
     call files%files(size(names))%put(summary_json(input, summary))
     call writer%file%complete(trim(trajectory_names(1, writer%form)), error)

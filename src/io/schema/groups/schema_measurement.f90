@@ -84,6 +84,8 @@ module nocdyn_schema_measurement
       'speed of the body of &response at which it was measured; if not given it is one of a run', 'peak'), &
     key_rule_t('measurement', 'deviation', a_number, 1, '', unset, positive, &
       'standard deviation of the values, in their unit; of frequencies relative to them'), &
+    key_rule_t('measurement', 'damping_deviation', a_number, 1, '', unset, positive, &
+      'standard deviation of relative_damping; the relative one of the frequencies if not given', 'frequency'), &
     key_rule_t('measurement', 'from', a_number, 1, 's', unset, anything, &
       'only values from this time of the run on', 'series peak'), &
     key_rule_t('measurement', 'until', a_number, 1, 's', unset, anything, 'only values up to this time', 'series'), &
@@ -96,6 +98,7 @@ module nocdyn_schema_measurement
     relation_rule_t('measurement', requires, 'column time_column speed_column', 'file'), &
     relation_rule_t('measurement', requires, 'pulse_column time_unit speed_unit', 'file'), &
     relation_rule_t('measurement', less_than, 'from', 'until'), &
+    relation_rule_t('measurement', requires, 'damping_deviation', 'relative_damping'), &
     relation_rule_t('measurement', requires, 'largest_drift drift_interval', 'alignment', word='drifting'), &
     relation_rule_t('measurement', requires, 'pulses_per_turn', 'pulses pulse_column'), &
     relation_rule_t('measurement', records, 'times speeds pulses values', &
