@@ -18,7 +18,7 @@ CATALOGUES = {
     "A 200,4.5,1.1,200,2.5,400,12\nA 250,9,1.0,300,5,800,20\n",
     "semicolons": "Size;Stiffness [kN m/rad];Relative damping [-];Power loss [W];Maximum torque [kN m];Vibratory torque [N m]\n"
     "A 200;4,5;1,1;200;2,5;400\nA 250;9;1,0;300;5;800\n",
-    "quotes": "\"size\",'stiffness [kN m/rad]',\"relative_damping\"\n\"A 200\",'4.5',1.1\n'A 250',\"9\",1.0\n",
+    "quotes": '"size",\'stiffness [kN m/rad]\',"relative_damping"\n"A 200",\'4.5\',1.1\n\'A 250\',"9",1.0\n',
     "tabs": "size\tstiffness\trelative_damping\tpower_loss\tmaximum_torque\tvibratory_torque\tfirst_inertia\tsecond_inertia\n"
     "A 200\t4500\t1.1\t200\t2500\t400\t0.5\t0.25\nA 250\t9000\t1.0\t300\t5000\t800\t1.0\t0.5\n",
 }
