@@ -54,6 +54,15 @@ class Comparison:
         return self._column("computed")
 
     @property
+    def before(self) -> np.ndarray | None:
+        """Computed values before a fit, if it compared the same ones."""
+        return self._column("before") if f"before [{self.facts['unit']}]" in self.table else None
+
+    @property
+    def damping_before(self) -> np.ndarray | None:
+        return self.table["before_damping [1]"].to_numpy() if "before_damping [1]" in self.table else None
+
+    @property
     def dampings(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Measured and computed damping ratios of frequencies; None if none was measured."""
         names = ["measured_damping [1]", "computed_damping [1]"]

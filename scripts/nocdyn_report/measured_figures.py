@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from .comparisons import FREQUENCY, ORDER, SERIES, Comparison, read_comparisons
 from .speed_results import rpm
@@ -83,10 +82,11 @@ def _draw_bars(axes: Axes, modes: np.ndarray, measured: np.ndarray, computed: np
     for mode, one, other in zip(modes, measured, computed):
         told = f"{100 * (other - one) / one:+.2g} %" if one else ""
         axes.annotate(told, (mode, max(one, other)), (0, 3), textcoords="offset points", ha="center", fontsize=8.5)
-    axes.set_xlim(0.5, max(modes.max(), FEWEST) + 0.5)
+    room = 0.5 * max(FEWEST, modes.max() - modes.min() + 1)
+    axes.set_xlim((modes.min() + modes.max()) / 2 - room, (modes.min() + modes.max()) / 2 + room)
     axes.margins(y=0.25)
     axes.grid(visible=False, axis="x")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xticks(modes, [f"{mode:g}" for mode in modes])
 
 
 def measured_figures(folder: Path, report: str, title: str) -> dict[str, Figure]:

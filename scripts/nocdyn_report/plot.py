@@ -17,6 +17,7 @@ KINDS = {
     "response": ("response_figures", "response.json"),
     "orbit": ("orbit_figures", "orbit.json"),
     "transit": ("transit_figures", "transit.json"),
+    "fit": ("fit_figures", "fit.json"),
     "sweep": ("sweep_figures", "sweep.nc"),
 }
 PAPER = "paper"

@@ -77,7 +77,7 @@ def test_a_file_that_is_cut_or_lacks_what_is_inside_is_refused_in_one_line(
 def test_a_word_that_is_no_kind_is_told_with_the_kinds(results, capsys):
     assert plot.main(["foo", str(results)]) == 2
     assert capsys.readouterr().err == (
-        "nocdyn plot: 'foo' is no kind of results; there are: run, modes, campbell, response, orbit, transit, sweep, paper\n"
+        "nocdyn plot: 'foo' is no kind of results; there are: run, modes, campbell, response, orbit, transit, fit, sweep, paper\n"
     )
 
 

@@ -4,8 +4,8 @@ import json
 
 import pandas as pd
 import pytest
-from figure_files import assert_figures, call
-from nocdyn_report import measured_figures
+from figure_files import assert_figures, call, refusal
+from nocdyn_report import fit_figures, measured_figures
 from nocdyn_report.comparisons import read_comparisons
 
 pytestmark = pytest.mark.filterwarnings("error::UserWarning")  # as Matplotlib's of a layout that does not fit
@@ -49,3 +49,49 @@ def test_measured_orders_are_points_over_the_speed_in_rpm(nocdyn):
     assert list(measured.get_ydata()) == [4, 70]
     table = pd.read_csv(nocdyn.folder / "out/measured_o.csv")
     assert list(computed.get_ydata()) == pytest.approx(list(table["computed [N m]"]))
+
+
+FITTED = """
+&measurement name = 'g' signal = 'total_moment_c' times = 0, 0.1, 0.2, 0.3 values = 0, -60, -70, -65 deviation = 4 /
+&measurement name = 'o' kind = 'order' order = 2 signal = 'total_moment_c' speeds_rpm = 300, 600 values = 4, 70 /
+&measurement name = 'p' kind = 'peak' signal = 'total_moment_c' speed_rpm = 400 values = 30 /
+&measurement name = 'f' kind = 'frequency' frequency_hz = 19.2 relative_damping = 0.021 deviation = 0.01 /
+&unknown target = 'coupling.c.stiffness' low = 5e3 high = 2e4 /
+&unknown target = 'coupling.c.damping' low = 1 high = 10 /
+"""
+
+
+def test_a_fit_is_drawn(nocdyn, monkeypatch):
+    folder = compute(nocdyn, "fit", FITTED)
+    report = json.loads((folder / "fit.json").read_text())
+    figures = fit_figures.draw_all(folder)
+    names = ["fit_g", "fit_o", "fit_p", "fit_f", "fit_unknowns", "fit_correlations"]
+    assert list(figures) == names
+    table = pd.read_csv(folder / "fit_g.csv")
+    upper, lower = figures["fit_g"].axes
+    drawn = [list(line.get_ydata()) for line in upper.lines]
+    assert drawn == [pytest.approx(list(table[f"{word} [N m]"])) for word in ("measured", "before", "computed")]
+    assert list(lower.lines[1].get_ydata()) == pytest.approx(list(table["difference [N m]"]))
+    frequencies, dampings = ([bar.get_height() for bar in axes.patches] for axes in figures["fit_f"].axes)
+    assert frequencies[0] == pytest.approx(19.2) and len(frequencies) == 3 and dampings[0] == 0.021
+    left, right = figures["fit_unknowns"].axes
+    stiffness = report["unknowns"][0]
+    assert left.lines[2].get_xdata()[0] == pytest.approx((stiffness["fitted"] - 5e3) / 1.5e4)
+    ends = right.containers[0].lines[1][0].get_xdata()[0], right.containers[0].lines[1][1].get_xdata()[0]
+    half = 100 * 1.959963984540054 * stiffness["standard_error"] / stiffness["fitted"]
+    assert ends == pytest.approx((-half, half))
+    image = figures["fit_correlations"].axes[0].images[0].get_array()
+    assert image[0, 1] == pytest.approx(stiffness["correlation"][1])
+    call(monkeypatch, "fit_figures", folder, "--format", "svg")
+    assert_figures(folder / "figures", *names, formats=("svg",))
+
+
+def test_what_no_measurement_tells_has_no_interval(nocdyn):
+    idle = "&body name = 'idle' inertia = 1 /\n&unknown target = 'body.idle.inertia' low = 0.5 high = 2 /\n"
+    groups = "".join(line for line in FITTED.splitlines(keepends=True) if "'g'" in line or "stiffness" in line)
+    right = fit_figures.draw_all(compute(nocdyn, "fit", groups + idle))["fit_unknowns"].axes[1]
+    assert "not determined" in [text.get_text() for text in right.texts]
+
+
+def test_a_folder_without_a_fit_is_refused(tmp_path, monkeypatch):
+    assert "fit.json: cannot be read" in refusal(monkeypatch, "fit_figures", tmp_path)

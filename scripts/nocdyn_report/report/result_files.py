@@ -13,9 +13,10 @@ MAIN_FILES = {  # what a command reports, of the machine or of one load case
     "run": "summary.json",
     "transit": "transit.json",
     "orbit": "orbit.json",
+    "fit": "fit.json",
 }
 CASES = {"run": "cases.json"} | {
-    name: f"{name}_cases.json" for name in ("equilibrium", "modes", "campbell", "response", "transit", "orbit")
+    name: f"{name}_cases.json" for name in ("equilibrium", "modes", "campbell", "response", "transit", "orbit", "fit")
 }
 DONE = "done"
 

@@ -136,7 +136,7 @@ contains
       'find numbers of the machine from measurements', &
       'Finds the values of &unknown with which the machine does what &measurement says, by least squares: with' // nl // &
       'standard errors, correlations, and what the measurements do not tell apart. Writes fitted.nml, the input with' // nl // &
-      'the values, fit.csv and fit.json.' // nl // nl // &
+      'the values, fit.csv, fit.json, and fit_NAME.csv of each measurement before and after.' // nl // nl // &
       '  --starts NUMBER    search from so many points between the bounds too; default: 1, the start' // nl // &
       '  --out DIR          write to DIR, with several files to DIR/<name of the file>;' // nl // &
       '                     default: &output directory, else results/<name of the file>' // nl // &
