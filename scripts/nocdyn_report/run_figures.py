@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .columns import CURRENT, FORCE, LOSS, MOMENT, REACTION, SLIP, SPEED, STRESS, TORQUE, TWIST, Column, by_sort
-from .failure import ResultsError
+from .failure import ChoiceError, ResultsError
 from .measured_figures import measured_figures
 from .multiples import MOST_PANELS, draw_multiples
 from .phase_planes import MOST_PLANES, draw_phase_planes
@@ -21,6 +21,7 @@ from .results import Header, Results, read_results
 from .selection import matching, widest
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, draw_lines, save, saved
 from .thinning import thin
+from .waterfall_figures import column_waterfalls, measured_waterfalls
 
 MOTION = (SPEED, SLIP, TWIST)
 TORQUES = (MOMENT, REACTION, FORCE, STRESS, TORQUE, LOSS, CURRENT)
@@ -169,7 +170,8 @@ def _advise(results: Results) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    usage = "%(prog)s RESULTS [--columns PATTERN ...] [--from T] [--to T] [--rpm] [--format KINDS] [--out DIR]"
+    usage = "%(prog)s RESULTS [--columns PATTERN ...] [--from T] [--to T] [--rpm]\n"
+    usage += "       [--waterfall PATTERN ...] [--speed BODY] [--format KINDS] [--out DIR]"
     parser = argparse.ArgumentParser(prog="nocdyn plot run", usage=usage, description=__doc__)
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'nocdyn run' wrote")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where the figures go (RESULTS/figures)")
@@ -182,8 +184,26 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--from", dest="start", type=_time, default=-math.inf, metavar="T", help="first time [s]")
     parser.add_argument("--to", dest="end", type=_time, default=math.inf, metavar="T", help="last time [s]")
     parser.add_argument("--rpm", action="store_true", help="speeds in rpm")
+    parser.add_argument(
+        "--waterfall",
+        nargs="+",
+        metavar="PATTERN",
+        help="draws the amplitudes of frequencies and orders of these columns only, over the speed of a run-up",
+    )
+    parser.add_argument("--speed", metavar="BODY", help="the body whose speed and turns --waterfall takes; the first one")
     add_format_option(parser)
     return parser
+
+
+def _speed_label(header: Header, body: str | None) -> str:
+    """The column of the speed of a body."""
+    speeds = header.of("omega")
+    if not speeds:
+        raise ChoiceError(f"{header.folder}: the trajectory has no speed of a body, over which waterfalls are")
+    named = {header.columns[label].title.lower(): label for label in speeds}
+    if body and body.lower() not in named:
+        raise ChoiceError(f"{header.folder}: no speed of '{body}'; there are: {', '.join(named)}")
+    return named[body.lower()] if body else speeds[0]
 
 
 def _hint(header: Header, patterns: Sequence[str] | None) -> str:
@@ -204,36 +224,53 @@ def _time(text: str) -> float:
 
 
 def _drawn(results: Results, arguments: argparse.Namespace) -> Figures:
+    if arguments.waterfall:
+        return column_waterfalls(
+            results, _waterfall_labels(results.header, arguments), _speed_label(results.header, arguments.speed)
+        )
     if arguments.columns:
         return draw_over_time(results, "columns", matching(results.header, arguments.columns))
     return default_figures(results)
 
 
-def _needed(header: Header, patterns: Sequence[str] | None) -> Iterator[str]:
-    if patterns:
-        return iter(matching(header, patterns))
+def _waterfall_labels(header: Header, arguments: argparse.Namespace) -> list[str]:
+    speed = _speed_label(header, arguments.speed)
+    return [label for label in matching(header, arguments.waterfall) if label != speed]
+
+
+def _needed(header: Header, arguments: argparse.Namespace) -> Iterator[str]:
+    if arguments.waterfall:
+        return iter([*_waterfall_labels(header, arguments), _speed_label(header, arguments.speed)])
+    if arguments.columns:
+        return iter(matching(header, arguments.columns))
     return (label for labels in default_labels(header).values() for label in labels)
 
 
 def main() -> None:
     parser = _parser()
     arguments = parser.parse_args()
+    if arguments.waterfall and arguments.columns:
+        parser.error("--waterfall and --columns are for one figure each")
+    if arguments.speed and not arguments.waterfall:
+        parser.error("--speed is of --waterfall")
     if arguments.start >= arguments.end:
         parser.error(f"--from {arguments.start:g} must be less than --to {arguments.end:g}")
     folder = arguments.out or arguments.results / "figures"
-    results = read_results(arguments.results, lambda header: _needed(header, arguments.columns), arguments.rpm)
+    results = read_results(arguments.results, lambda header: _needed(header, arguments), arguments.rpm)
     results = results.between(arguments.start, arguments.end)
     if results.shortfall:
         print(f"{parser.prog}: {arguments.results}: the trajectory is partial: {results.shortfall}", file=sys.stderr)
     figures = _drawn(results, arguments)
-    if not arguments.columns:
+    chosen = arguments.columns or arguments.waterfall
+    if not chosen:
         figures |= measured_figures(arguments.results, "summary.json", results.title)
+        figures |= measured_waterfalls(arguments.results, results.title)
     if not figures:
         raise ResultsError(f"{arguments.results}: nothing to draw: the trajectory has the time only")
     for name, figure in figures.items():
         save(figure, folder, name, arguments.format)
     print(saved(list(figures), arguments.format, folder))
-    for remark in (_hint(results.header, arguments.columns), _advise(results)):
+    for remark in (_hint(results.header, chosen), "" if arguments.waterfall else _advise(results)):
         if remark:
             print(remark)
 
