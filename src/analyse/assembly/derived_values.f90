@@ -97,7 +97,9 @@ contains
       end if
     end if
     call group%set_number('stiffness', law%base(1) * group%number('stiffness', absent=0.0_wp))
-    if (group%has_value('relative_damping')) call group%set_number('relative_damping', law%base(2) * group%number('relative_damping'))
+    if (group%has_value('relative_damping')) then
+      call group%set_number('relative_damping', law%base(2) * group%number('relative_damping'))
+    end if
     if (group%has_value('magnifier')) call group%set_number('magnifier', group%number('magnifier') / law%base(2))
   end subroutine derive_rubber
 

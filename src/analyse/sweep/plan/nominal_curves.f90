@@ -44,7 +44,7 @@ contains
     integer :: i, n
 
     call assemble_machine(input, machine, error)
-    if (.not. allocated(error)) call new_analysis_reader(input, machine, reader, error)
+    if (.not. allocated(error)) call new_analysis_reader(input, machine, 'record', reader, error)
     if (allocated(error)) return
     allocate (all_results(0))
     associate (records => input%groups_named('record'))

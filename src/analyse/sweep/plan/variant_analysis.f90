@@ -19,7 +19,6 @@ module nocdyn_variant_analysis
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
   use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
-  use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: worst_ratio
   use nocdyn_signals, only: former_name
   use nocdyn_text, only: to_text
