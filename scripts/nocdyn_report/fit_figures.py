@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import pyplot
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .comparisons import FREQUENCY, SERIES, Comparison, read_comparisons
 from .json_files import read_json, with_case
-from .measured_figures import COMPUTED, DIGITS, LONGEST, MEASURED, MOST_POINTS
+from .measured_figures import COMPUTED, DIGITS, LONGEST, MEASURED, MOST_POINTS, draw_bars
 from .report.result_files import case_of
 from .speed_results import rpm
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, plain, save, saved
@@ -21,9 +20,7 @@ from .thinning import thin
 REPORT = "fit.json"
 BEFORE = {"color": COLOURS[1], "linewidth": 0.9}
 CONFIDENT = 1.959963984540054  # standard errors on either side of 95 % of a normal distribution
-BAR = 0.26  # width of one of three bars
 MOST_NUMBERS = 12  # unknowns whose correlations have room as numbers
-FEWEST = 4  # groups of bars that have room
 BAND = {"color": "0.85", "linewidth": 0.0, "zorder": 0}
 
 
@@ -64,7 +61,8 @@ def draw_values(one: Comparison, title: str) -> Figure:
     figure, grid = pyplot.subplots(len(panels), 1, squeeze=False, figsize=(WIDTH, 2.6 * len(panels) + 1.1))
     places = one.abscissa if is_frequency else np.arange(len(one.measured))
     for axes, (words, values) in zip(grid.flat, panels):
-        _draw_bars(axes, places, values)
+        named = zip(("measured", "before", "after"), (MEASURED, BEFORE, COMPUTED), values)
+        draw_bars(axes, places, [(name, look["color"], bars) for name, look, bars in named if bars is not None])
         axes.set_ylabel(plain(textwrap.fill(words, LONGEST)))
         if not is_frequency:
             axes.set_xticks([])
@@ -72,25 +70,6 @@ def draw_values(one: Comparison, title: str) -> Figure:
     grid.flat[-1].set_xlabel("mode; above the bars: difference to the measured value" if is_frequency else "")
     add_title(figure, title, f"{one.name}: {one.subject}")
     return figure
-
-
-def _draw_bars(axes: Axes, places: np.ndarray, values: Sequence[np.ndarray | None]) -> None:
-    looks = (("measured", MEASURED), ("before", BEFORE), ("after", COMPUTED))
-    measured = values[0]
-    for side, (bars, (label, look)) in enumerate(zip(values, looks)):
-        if bars is None:
-            continue
-        axes.bar(places + (side - 1) * BAR, bars, width=BAR, color=look["color"], label=label)
-        for place, bar, one in zip(places, bars, measured) if side else ():
-            told = f"{100 * (bar - one) / abs(one):+.2g} %" if one else ""
-            at, lift = (place + (side - 1) * BAR, bar), 3 if bar >= 0 else -3
-            vertical = "bottom" if bar >= 0 else "top"
-            axes.annotate(told, at, (0, lift), textcoords="offset points", ha="center", va=vertical, fontsize=8)
-    room = 0.5 * max(FEWEST, places.max() - places.min() + 1)
-    axes.set_xlim((places.min() + places.max()) / 2 - room, (places.min() + places.max()) / 2 + room)
-    axes.margins(y=0.3)
-    axes.grid(visible=False, axis="x")
-    axes.set_xticks(places, [f"{place:g}" for place in places])
 
 
 def draw_unknowns(unknowns: Sequence[dict], title: str) -> Figure:

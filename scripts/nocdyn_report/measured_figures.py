@@ -1,6 +1,7 @@
 """Measured values over the computed ones, and their differences: of a run, a response or modes with &measurement."""
 
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,8 @@ COMPUTED = {"color": COLOURS[0], "linewidth": 1.2}
 LONGEST = 34  # characters of a line beside a panel
 MOST_POINTS = 40  # of a record that has a mark for each value
 DIGITS = 4
-BAR = 0.38  # width of one of two bars at a mode
-FEWEST = 4  # modes that have room
+GROUP = 0.78  # width of the bars side by side
+FEWEST = 4  # of such groups that have room
 
 
 def remark_on(comparison: Comparison) -> str:
@@ -66,7 +67,8 @@ def draw_frequencies(comparison: Comparison, title: str) -> Figure:
         panels.append(("damping ratio", *comparison.dampings))
     figure, grid = pyplot.subplots(len(panels), 1, squeeze=False, figsize=(WIDTH, 2.6 * len(panels) + 1.0))
     for axes, (label, measured, computed) in zip(grid.flat, panels):
-        _draw_bars(axes, comparison.abscissa, measured, computed)
+        bars = [("measured", MEASURED["color"], measured), ("computed", COMPUTED["color"], computed)]
+        draw_bars(axes, comparison.abscissa, bars)
         axes.set_ylabel(label)
     grid.flat[0].legend(loc="upper left", ncols=2)
     grid.flat[-1].set_xlabel("mode; above the bars: difference of the computed value")
@@ -75,18 +77,22 @@ def draw_frequencies(comparison: Comparison, title: str) -> Figure:
     return figure
 
 
-def _draw_bars(axes: Axes, modes: np.ndarray, measured: np.ndarray, computed: np.ndarray) -> None:
-    """Two bars for each mode, and what the computed value differs by."""
-    for side, values, look, label in ((-0.5, measured, MEASURED, "measured"), (0.5, computed, COMPUTED, "computed")):
-        axes.bar(modes + side * BAR, values, width=BAR, color=look["color"], label=label)
-    for mode, one, other in zip(modes, measured, computed):
-        told = f"{100 * (other - one) / one:+.2g} %" if one else ""
-        axes.annotate(told, (mode, max(one, other)), (0, 3), textcoords="offset points", ha="center", fontsize=8.5)
-    room = 0.5 * max(FEWEST, modes.max() - modes.min() + 1)
-    axes.set_xlim((modes.min() + modes.max()) / 2 - room, (modes.min() + modes.max()) / 2 + room)
-    axes.margins(y=0.25)
+def draw_bars(axes: Axes, places: np.ndarray, bars: Sequence[tuple[str, str, np.ndarray]]) -> None:
+    """Bars side by side, (label, colour, values) each; above those after the first, the measured ones, by what they differ."""
+    width = GROUP / len(bars)
+    measured = bars[0][2]
+    for side, (label, colour, values) in enumerate(bars):
+        at = places + (side - 0.5 * (len(bars) - 1)) * width
+        axes.bar(at, values, width=width, color=colour, label=label)
+        for x, value, one in zip(at, values, measured) if side else ():
+            told, sign = f"{100 * (value - one) / abs(one):+.2g} %" if one else "", 1 if value >= 0 else -1
+            look = {"ha": "center", "va": "bottom" if sign > 0 else "top", "fontsize": 8}
+            axes.annotate(told, (x, value), (0, 3 * sign), textcoords="offset points", **look)
+    room = 0.5 * max(FEWEST, places.max() - places.min() + 1)
+    axes.set_xlim((places.min() + places.max()) / 2 - room, (places.min() + places.max()) / 2 + room)
+    axes.margins(y=0.3)
     axes.grid(visible=False, axis="x")
-    axes.set_xticks(modes, [f"{mode:g}" for mode in modes])
+    axes.set_xticks(places, [f"{place:g}" for place in places])
 
 
 def measured_figures(folder: Path, report: str, title: str) -> dict[str, Figure]:
