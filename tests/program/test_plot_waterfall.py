@@ -45,6 +45,12 @@ def test_orders_of_a_chirp_have_their_amplitudes(sign, is_down):
     assert one.amplitudes[:, others].max() < 0.02
 
 
+def test_an_order_above_the_lines_has_no_alias():
+    one = order_waterfall(TIMES, 5 * np.sin(ANGLES) + 2 * np.sin(30 * ANGLES), SPEEDS)
+    assert one.lines[-1] < 30
+    assert one.amplitudes[:, np.abs(one.lines - 1) > 0.2].max() < 0.02
+
+
 def test_frequencies_of_a_chirp_lie_on_the_lines_of_its_orders():
     one = frequency_waterfall(TIMES, 5 * np.sin(2 * ANGLES), SPEEDS)
     ridge = one.lines[one.amplitudes.argmax(axis=1)]

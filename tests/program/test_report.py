@@ -403,6 +403,12 @@ def test_measurements_stand_beside_what_was_computed(fresh, browser):
     assert plain(shown[0].split(" ")[0]) == pytest.approx(hertz, rel=1e-3)
     damping = column(browser, "Measured natural frequencies: impact", "computed damping")
     assert plain(damping[0]) == pytest.approx(table["computed_damping [1]"][0], rel=1e-3)
+    places = browser.ask("""
+        const figure = [...document.querySelectorAll('figure')].find((one) => one.textContent.includes('damping ratios over'));
+        const at = (role, key) => Number(figure.querySelector(`.picture circle.role-${role}`).getAttribute(key));
+        return ['cx', 'cy'].map((key) => at('computed', key) - at('measured', key));
+    """)
+    assert np.sign(places) == pytest.approx([np.sign(hertz), -np.sign(table["computed_damping [1]"][0] - 0.021)])
     curves = browser.ask("""
         return [...document.querySelectorAll('figure')].filter((one) => one.textContent.includes('Measured and computed values'))
           .map((one) => [one.querySelectorAll('.picture path.curve.role-computed').length,
