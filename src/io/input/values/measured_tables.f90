@@ -49,7 +49,8 @@ contains
     end do
     if (m > size(groups)) then
       m = 0
-      call report(groups(g), g, 'there is no &measurement ' // quoted(shortened(wanted)) // near_match(wanted, names), diagnostics)
+      call report(groups(g), g, 'there is no &measurement ' // quoted(shortened(wanted)) // near_match(wanted, names), &
+                  diagnostics)
       return
     end if
     if (groups(m)%text('kind') /= 'series') then
