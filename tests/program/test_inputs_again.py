@@ -154,7 +154,7 @@ ELEMENTS = {
     f"&sweep design = 'grid' /\n{VARY} count = 3 /\n"
     "&excitation name = 'x' body = 'a' kind = 'orders' orders = 1 amplitudes = 2 /\n"
     "&response body = 'a' speed = 10, 20 operating = 12, 18 /\n&limit coupling = 'k' moment = 100 /\n"
-    "&record response = 'moment_k' statistic = 'peak', 'peak_speed', 'margin', 'ratio' /\n"
+    "&record response = 'moment_k' statistic = 'peak', 'peak_speed', 'margin', 'ratio', 'curve' /\n"
     "&record mode = 1 order = 1 statistic = 'crossing', 'crossing_margin' /",
     "shaker": "&coupling name = 'k' bodies = 'a', 'b' stiffness = 100 damping = 1 /\n"
     f"&sweep design = 'grid' /\n{VARY} count = 3 /\n"
