@@ -74,13 +74,14 @@ contains
 
   !> Builds the machine as it is in a steady state: with means over a turn, and, if it is asked for, with clutches and freewheels
   !> that are locked as constraint rows.
-  recursive subroutine assemble_steady_machine(input, locks_joints, machine, error, t, sets_speed)
+  recursive subroutine assemble_steady_machine(input, locks_joints, machine, error, t, sets_speed, starts)
     type(input_t), intent(in) :: input
     logical, intent(in) :: locks_joints     !! whether locked joints are rows
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
     real(wp), intent(in), optional :: t   !! the time at which clutches are engaged or not [s]; absent: after all changes
     logical, intent(in), optional :: sets_speed   !! whether an analysis sets the speed in place of a drive; absent: no
+    logical, intent(in), optional :: starts   !! whether it starts in its steady state, if the input wants it; absent: yes
     type(steady_view_t) :: view
     character(len=:), allocatable :: text
     logical :: is_changed
@@ -109,6 +110,9 @@ contains
       call raise(error, exit_failed, input%shown_file() // ': no steady state was found in which each freewheel ' // &
                  'holds or overruns')
     else
+      if (present(starts)) then
+        if (.not. starts) return
+      end if
       call start_machine(input, .true., machine, error)
     end if
   end subroutine assemble_steady_machine

@@ -38,6 +38,13 @@ module nocdyn_excitation_lines
     logical :: is_slip = .false.        !! as of a line
   end type source_t
 
+  !> A harmonic as its element lists it.
+  type, public :: listed_harmonic_t
+    type(harmonic_t) :: harmonic
+    integer :: lister = 0               !! the element
+    integer :: number = 0               !! among those that it lists
+  end type listed_harmonic_t
+
   !> Work space of one thread, and the last solution.
   type, public :: line_work_t
     type(band_work_t) :: band
@@ -47,7 +54,7 @@ module nocdyn_excitation_lines
 
   real(wp), parameter :: same = 1.0e-9_wp   ! relative difference of equal frequencies
 
-  public :: list_sources
+  public :: frequency_of, list_machine_harmonics, list_sources, set_sources
 
 contains
 
@@ -70,41 +77,87 @@ contains
     type(source_t), allocatable, intent(out) :: sources(:)
     integer, intent(in), optional :: shaker     !! the only element that counts, whose frequency is `speed` of the state;
                                                 !! absent or 0: all count
-    type(harmonic_t), allocatable :: list(:)
-    type(source_t), allocatable :: longer(:)
-    integer :: b, e, i, k, n, only
-    real(wp) :: speed
+    type(listed_harmonic_t), allocatable :: list(:)
 
-    only = 0
-    if (present(shaker)) only = shaker
+    call list_machine_harmonics(machine, state, list, shaker)
+    call set_sources(list, state, sources)
+  end subroutine list_sources
+
+  !> The harmonics at the speeds of a steady state.
+  subroutine list_machine_harmonics(machine, state, list, shaker, only)
+    type(machine_t), intent(in) :: machine      !! with its periodic torques
+    type(held_state_t), intent(in) :: state
+    type(listed_harmonic_t), allocatable, intent(out) :: list(:)
+    integer, intent(in), optional :: shaker     !! as of `list_sources`
+    integer, intent(in), optional :: only       !! the only element that is asked; absent: all are
+    type(harmonic_t), allocatable :: of_element(:)
+    type(listed_harmonic_t), allocatable :: longer(:)
+    integer :: alone, b, e, i, k, n
+    real(wp) :: speed
+    logical :: is_shaken
+
+    alone = 0
+    if (present(shaker)) alone = shaker
+    is_shaken = alone > 0
+    if (present(only)) alone = only
     n = 0
-    allocate (sources(64))
+    allocate (list(64))
     do b = 1, size(machine%banks)
       associate (bank => machine%banks(b)%bank)
         if (bank%role == role_load) cycle
+        if (alone > 0 .and. (alone < bank%first .or. alone > bank%last())) cycle
         do e = 1, bank%count
-          if (only == 0 .and. bank%has_ended(e) .or. only > 0 .and. bank%first + e - 1 /= only) cycle
+          if (.not. is_shaken .and. bank%has_ended(e) .or. alone > 0 .and. bank%first + e - 1 /= alone) cycle
           speed = 0.0_wp
           do k = bank%rows%first(e), bank%rows%first(e + 1) - 1
             if (bank%rows%body(k) > 0) speed = speed + bank%rows%coefficient(k) * state%omega(bank%rows%body(k))
           end do
-          call bank%list_harmonics(e, speed, list)
-          if (n + size(list) > size(sources)) then
-            allocate (longer(2 * (n + size(list))))
-            longer(:n) = sources(:n)
-            call move_alloc(longer, sources)
+          call bank%list_harmonics(e, speed, of_element)
+          if (n + size(of_element) > size(list)) then
+            allocate (longer(2 * (n + size(of_element))))
+            longer(:n) = list(:n)
+            call move_alloc(longer, list)
           end if
-          do i = 1, size(list)
-            if (only > 0) list(i)%frequency = state%speed
-            call set_source(list(i), state, sources(n + i))
-            if (list(i)%by_element > 0) sources(n + i)%moment = state%mean(list(i)%by_element) * sources(n + i)%moment
+          do i = 1, size(of_element)
+            if (is_shaken) of_element(i)%frequency = state%speed
+            list(n + i) = listed_harmonic_t(of_element(i), bank%first + e - 1, i)
           end do
-          n = n + size(list)
+          n = n + size(of_element)
         end do
       end associate
     end do
-    sources = sources(:n)
-  end subroutine list_sources
+    list = list(:n)
+  end subroutine list_machine_harmonics
+
+  !> Harmonics as sources in a steady state.
+  subroutine set_sources(list, state, sources)
+    type(listed_harmonic_t), intent(in) :: list(:)
+    type(held_state_t), intent(in) :: state
+    type(source_t), allocatable, intent(out) :: sources(:)
+    integer :: i
+
+    allocate (sources(size(list)))
+    do i = 1, size(list)
+      associate (harmonic => list(i)%harmonic)
+        call set_source(harmonic, state, sources(i))
+        if (harmonic%by_element > 0) sources(i)%moment = state%mean(harmonic%by_element) * sources(i)%moment
+      end associate
+    end do
+  end subroutine set_sources
+
+  !> The frequency of a harmonic that is known from another state or machine [rad/s].
+  real(wp) function frequency_of(known, machine, state, shaker) result(frequency)
+    type(listed_harmonic_t), intent(in) :: known
+    type(machine_t), intent(in) :: machine      !! with its periodic torques
+    type(held_state_t), intent(in) :: state
+    integer, intent(in) :: shaker               !! as of `list_sources`
+    type(listed_harmonic_t), allocatable :: list(:)
+    type(source_t) :: source
+
+    call list_machine_harmonics(machine, state, list, shaker, known%lister)
+    call set_source(list(known%number)%harmonic, state, source)
+    frequency = source%frequency
+  end function frequency_of
 
   !> A harmonic with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega > 0.
   pure subroutine set_source(harmonic, state, source)

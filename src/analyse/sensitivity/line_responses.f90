@@ -20,6 +20,7 @@ module nocdyn_line_responses
 
   !> One line.
   type :: line_response_t
+    real(wp) :: frequency = 0.0_wp                       !! Omega [rad/s]
     complex(wp) :: slope = 0.0_wp                        !! of the half range by the amplitude
     complex(wp), allocatable :: x(:), adjoint(:)         !! coordinates
     complex(wp), allocatable :: twist(:)                 !! U_e x - s_e [rad], [elements]
@@ -36,7 +37,7 @@ module nocdyn_line_responses
     real(wp), allocatable, private :: weight(:)          !! w_e, [elements]
     type(line_response_t), allocatable, private :: lines(:)
   contains
-    procedure :: changed
+    procedure :: changed, slope_by_inertia
   end type line_responses_t
 
 contains
@@ -74,7 +75,8 @@ contains
       self%weight = weights_of(quantity, self%point, elements)
       do l = 1, lines
         self%lines(l)%slope = slope(l)
-        call solve_adjoint(response, state, sources(response%lines(l)%source(1))%frequency, self%weight, work, self%lines(l))
+        self%lines(l)%frequency = sources(response%lines(l)%source(1))%frequency
+        call solve_adjoint(response, state, self%weight, work, self%lines(l))
       end do
     end associate
   end subroutine new_line_responses
@@ -136,10 +138,9 @@ contains
   end subroutine list_forces
 
   !> The adjoint motion of a line.
-  subroutine solve_adjoint(response, state, frequency, weight, work, self)
+  subroutine solve_adjoint(response, state, weight, work, self)
     type(forced_response_t), intent(in) :: response
     type(held_state_t), intent(in) :: state
-    real(wp), intent(in) :: frequency
     real(wp), intent(in) :: weight(:)   !! w_e, [elements]
     type(line_work_t), intent(inout) :: work
     type(line_response_t), intent(inout) :: self
@@ -153,7 +154,7 @@ contains
       n = n + 1
       twists(n) = source_t(element=e, moment=cmplx(-weight(e), kind=wp), is_twist=.true.)
     end do
-    call solve_line(response%machine, response%matrix, state%slopes, frequency, twists, work)
+    call solve_line(response%machine, response%matrix, state%slopes, self%frequency, twists, work)
     allocate (self%weight(size(weight)))
     do e = 1, size(weight)
       call find_twist(response%matrix, e, work, self%weight(e), moment)
@@ -161,6 +162,20 @@ contains
     allocate (self%adjoint, source=work%band%x(response%matrix%position(:response%matrix%coordinates)))
     allocate (self%adjoint_angle, source=angles_of(response%machine, self%adjoint))
   end subroutine solve_adjoint
+
+  !> The derivative of the half range by the inertia of a body.
+  pure real(wp) function slope_by_inertia(self, body) result(slope)
+    class(line_responses_t), intent(in) :: self
+    integer, intent(in) :: body
+    integer :: l
+
+    slope = 0.0_wp
+    do l = 1, size(self%lines)
+      associate (one => self%lines(l))
+        slope = slope + real(one%slope * one%frequency**2 * one%angle(body) * one%adjoint_angle(body), wp)
+      end associate
+    end do
+  end function slope_by_inertia
 
   !> The half range of a changed machine to the first order, up to a constant.
   real(wp) function changed(self, response, frame, view, machine, state, sources, quantity)

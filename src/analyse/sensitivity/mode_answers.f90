@@ -10,6 +10,9 @@ module nocdyn_mode_answers
   use nocdyn_band_pencil, only: band_pencil_t, new_band_pencil
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_frozen_motions, only: eigenvalue_change, frame_t, frozen_motion_t, new_frame, new_view, view_t
+  use nocdyn_frozen_states, only: displacement_t, freeze_equilibrium, frozen_state_t, mean_laws_t
+  use nocdyn_formulation, only: formulation_t
+  use nocdyn_held_speeds, only: held_state_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: ascending_order
@@ -17,11 +20,12 @@ module nocdyn_mode_answers
   use nocdyn_linearisation, only: find_slopes, has_turning_losses, held_elements
   use nocdyn_machine, only: machine_t
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
-  use nocdyn_quick_changes, only: new_quick_change, quick_change_t
+  use nocdyn_number_changes, only: changed_machine_t, displacement_of, number_change_t
   use nocdyn_slopes, only: slopes_t
   use nocdyn_text, only: append, rounded_text, string_t, to_text
+  use nocdyn_torque_balance, only: set_up_balance, torque_balance_t
   use nocdyn_units, only: from_si, unit_hz
-  use nocdyn_varied_keys, only: varied_key_t
+  use nocdyn_varied_keys, only: near_points
   use nocdyn_wanted_modes, only: choose_numbers, find_covering, modes_choice_t, wanted_modes_t
   implicit none (type, external)
   private
@@ -32,7 +36,8 @@ module nocdyn_mode_answers
 
   type, extends(answers_t), public :: mode_answers_t
     type(frame_t), private :: frame
-    type(machine_t), private :: machine                !! at the operating point
+    type(mean_laws_t), private :: laws                 !! of the machine, at the operating point
+    type(frozen_state_t), private :: frozen            !! this, if it is a steady state
     type(slopes_t), private :: slopes
     character(len=:), allocatable, private :: at       !! the state: 'equilibrium', ...
     complex(wp), allocatable, private :: value(:)      !! eigenvalues [1/s], [modes]
@@ -42,7 +47,7 @@ module nocdyn_mode_answers
     complex(wp), allocatable, private :: norm(:)       !! their forms with T_lambda, [pairs]
     complex(wp), allocatable, private :: turn(:)       !! their forms with T_omega, [pairs]
   contains
-    procedure :: evaluate, finish
+    procedure :: differentiate_near, evaluate, finish
   end type mode_answers_t
 
 contains
@@ -73,8 +78,10 @@ contains
       return
     end if
     allocate (held, source=held_elements(point%formulation))
-    self%machine = point%formulation%machine
+    self%laws%machine = point%formulation%machine
+    self%laws%state = point%formulation%state
     self%slopes = slopes
+    if (at == 'equilibrium') call freeze(point, self%frozen)
     self%frame = new_frame(point%formulation%machine)
     call new_band_pencil(point%formulation%machine, self%frame%incidence, slopes%stiffness, held, pencil, error)
     if (allocated(error)) return
@@ -174,28 +181,69 @@ contains
     if (.not. allocated(error)) call find_slopes(point%formulation, point%t, point%y, slopes, error)
   end subroutine find_state
 
-  subroutine evaluate(self, input, key, point, values, error)
+  !> Keeps a steady state that has just been linearised.
+  subroutine freeze(point, frozen)
+    type(operating_point_t), intent(in) :: point
+    type(frozen_state_t), intent(out) :: frozen
+    class(formulation_t), allocatable :: formulation
+    type(torque_balance_t) :: balance
+
+    allocate (formulation, source=point%formulation)
+    call set_up_balance(formulation, point%t, balance)
+    call freeze_equilibrium(balance, frozen)
+  end subroutine freeze
+
+  subroutine differentiate_near(self, number, slopes, is_done, error)
+    class(mode_answers_t), intent(inout) :: self
+    type(number_change_t), intent(inout) :: number
+    real(wp), intent(out) :: slopes(:)
+    logical, intent(out) :: is_done
+    type(error_t), allocatable, intent(out) :: error
+    type(changed_machine_t) :: near(near_points)
+    type(displacement_t) :: displacement
+    type(held_state_t) :: state
+    complex(wp) :: form
+    real(wp) :: values(size(slopes))
+    integer :: p
+
+    slopes = 0.0_wp
+    is_done = number%body > 0
+    if (is_done) then
+      do p = 1, size(self%partner, 2)
+        associate (i => self%partner(1, p), k => self%partner(2, p), b => number%body)
+          form = self%value(i)**2 * self%motion(i)%angle(b) * self%motion(k)%angle(b)
+        end associate
+        slopes(2 * p - 1:2 * p) = [real(form, wp), aimag(form)]
+      end do
+      return
+    end if
+    if (.not. self%frozen%is_frozen) return
+    call number%list_machines(self%laws, .false., self%frame, near, is_done, error)
+    if (allocated(error) .or. .not. is_done) return
+    call displacement_of(self%frozen, number%key, self%laws, near, displacement)
+    do p = 1, near_points
+      call near(p)%laws%state_at(self%frozen, displacement, number%key%near(p), state, error)
+      if (allocated(error)) return
+      call evaluate_forms(self, near(p)%view, near(p)%laws%machine, state%slopes, values)
+      slopes = slopes + number%key%near_weight(p) * values
+    end do
+    if (.not. abs(number%key%near_weight_here) > 0) return
+    call evaluate_forms(self, new_view(self%frame, self%laws%machine), self%laws%machine, self%slopes, values)
+    slopes = slopes + number%key%near_weight_here * values
+  end subroutine differentiate_near
+
+  subroutine evaluate(self, number, values, error)
     class(mode_answers_t), intent(in) :: self
-    type(input_t), intent(in) :: input
-    type(varied_key_t), intent(in) :: key
-    integer, intent(in) :: point
+    type(number_change_t), intent(in) :: number
     real(wp), intent(out) :: values(:)
     type(error_t), allocatable, intent(out) :: error
     type(machine_t) :: machine
     type(operating_point_t) :: operating
-    type(quick_change_t) :: quick
     type(slopes_t) :: slopes
     type(view_t) :: view
 
     values = 0.0_wp
-    quick = new_quick_change(input, key, self%machine)
-    if (quick%body > 0) then
-      machine = self%machine
-      machine%inertia(1, quick%body) = machine%inertia(1, quick%body) + (key%at(point) - key%value)
-      call evaluate_forms(self, view, machine, self%slopes, values)
-      return
-    end if
-    call find_state(input, self%at, machine, operating, slopes, error)
+    call find_state(number%input, self%at, machine, operating, slopes, error)
     if (allocated(error)) return
     view = new_view(self%frame, operating%formulation%machine)
     if (.not. view%is_alike) then

@@ -4,66 +4,39 @@
 !> change of the mode at this speed as in `nocdyn_mode_answers`. A half range at the peak of a critical speed is followed along
 !> with it: its change is that at a constant speed (`nocdyn_line_responses`) and its slope over the speed times dn.
 module nocdyn_response_answers
-  use nocdyn_answers, only: answer_t, answers_t
-  use nocdyn_assembly, only: assemble_steady_machine
-  use nocdyn_critical_speeds, only: crossing_t
-  use nocdyn_errors, only: error_t, exit_failed, raise
-  use nocdyn_excitation_lines, only: list_sources, source_t
-  use nocdyn_frozen_motions, only: eigenvalue_change, frame_t, frozen_motion_t, new_frame, new_view, view_t
-  use nocdyn_held_speeds, only: held_speeds_t, held_state_t, new_held_speeds
+  use nocdyn_answers, only: answers_t
+  use nocdyn_errors, only: error_t
+  use nocdyn_excitation_lines, only: list_machine_harmonics, listed_harmonic_t, set_sources, source_t
+  use nocdyn_frozen_motions, only: eigenvalue_change, new_frame, new_view, view_t
+  use nocdyn_frozen_states, only: freeze_held
+  use nocdyn_held_speeds, only: held_speeds_t, held_state_t
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
-  use nocdyn_line_responses, only: line_responses_t, new_line_responses
+  use nocdyn_line_responses, only: new_line_responses
   use nocdyn_machine, only: machine_t
   use nocdyn_margins, only: operating_distance
   use nocdyn_mode_pairs, only: mode_pairs_t
   use nocdyn_moment_forms, only: kind_power, list_moment_forms, moment_form_t
-  use nocdyn_quick_changes, only: new_quick_change, quick_change_t
+  use nocdyn_number_changes, only: number_change_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
+  use nocdyn_response_functionals, only: assemble_response_machine, critical_answers_t, evaluate_critical, evaluate_half, &
+    half_range_answer_t, of_mode, response_functionals_t
   use nocdyn_response_summary, only: critical_t, response_summary_t, summarise_response
   use nocdyn_state_modes, only: find_pairs_at
   use nocdyn_text, only: append, rounded_text, string_t, to_text
   use nocdyn_units, only: from_si, unit_hz, unit_rpm
-  use nocdyn_varied_keys, only: central, points, sixth_order, varied_key_t
+  use nocdyn_varied_keys, only: central, find_weights, points
   implicit none (type, external)
   private
 
   public :: new_response_answers
 
-  integer, parameter :: of_mode = 3       ! functionals of a critical speed: the form of the mode, and the frequency of its line
   real(wp), parameter :: speed_step = 1.0e-3_wp   ! of differences over the speed, as a share of it
 
-  !> A critical speed.
-  type :: critical_answers_t
-    type(critical_t) :: critical
-    integer :: line = 0
-    complex(wp) :: value = 0.0_wp, norm = 0.0_wp, turn = 0.0_wp   ! the mode there, with its forms
-    type(frozen_motion_t) :: motion
-    type(held_state_t) :: state
-    real(wp) :: approach = 0.0_wp          ! of the line to the mode over the speed, dOmega/dn - domega/dn
-    integer :: answer = 0                  ! the critical speed among the answers; its margin, if there is one, is the next
-    logical :: has_margin = .false.
-    real(wp) :: margin_slope = 0.0_wp      ! of the margin by the size of the speed
-  end type critical_answers_t
-
-  !> A half range at a speed, which moves with a critical speed.
-  type :: half_range_answer_t
-    type(line_responses_t) :: lines
-    type(held_state_t) :: state
-    real(wp) :: speed = 0.0_wp             ! [rad/s]
-    real(wp) :: slope = 0.0_wp             ! over the speed, at constant numbers
-    integer :: critical = 0                ! 0: the speed stays
-    integer :: answer = 0
-  end type half_range_answer_t
-
   type, extends(answers_t), public :: response_answers_t
-    type(response_analysis_t), private :: analysis
-    type(frame_t), private :: frame
-    type(moment_form_t), allocatable, private :: forms(:)   !! all of the machine
-    type(critical_answers_t), allocatable, private :: criticals(:)
-    type(half_range_answer_t), allocatable, private :: halves(:)
+    type(response_functionals_t), private :: parts
   contains
-    procedure :: evaluate, finish
+    procedure :: differentiate_near, evaluate, finish
   end type response_answers_t
 
 contains
@@ -80,42 +53,32 @@ contains
     integer, allocatable :: chosen(:)
     integer :: i
 
-    call assemble(input, machine, error)
-    if (.not. allocated(error)) call analyse_response(input, machine, self%analysis, error)
+    call assemble_response_machine(input, machine, error)
+    if (.not. allocated(error)) call analyse_response(input, machine, self%parts%analysis, error)
     if (allocated(error)) return
-    self%frame = new_frame(self%analysis%response%machine)
-    summary = summarise_response(self%analysis)
-    call choose_criticals(self%analysis, summary, most, chosen, notes)
-    allocate (self%criticals(size(chosen)))
+    self%parts%frame = new_frame(self%parts%analysis%response%machine)
+    self%parts%laws%machine = self%parts%analysis%response%held%balance%formulation%machine
+    self%parts%laws%state = self%parts%analysis%response%held%balance%formulation%state
+    summary = summarise_response(self%parts%analysis)
+    call choose_criticals(self%parts%analysis, summary, most, chosen, notes)
+    allocate (self%parts%criticals(size(chosen)))
     do i = 1, size(chosen)
-      call find_critical(self, summary%criticals(chosen(i)), self%criticals(i), error)
+      call find_critical(self, summary%criticals(chosen(i)), self%parts%criticals(i), error)
       if (allocated(error)) return
     end do
     call list_halves(self, summary, error)
     if (.not. allocated(error)) call name_answers(self)
-    self%functionals = of_mode * size(self%criticals) + size(self%halves)
+    self%functionals = of_mode * size(self%parts%criticals) + size(self%parts%halves)
     allocate (self%scale(self%functionals))
-    do i = 1, size(self%criticals)
-      associate (one => self%criticals(i))
+    do i = 1, size(self%parts%criticals)
+      associate (one => self%parts%criticals(i))
         self%scale(of_mode * (i - 1) + 1:of_mode * i) = [abs(one%norm * one%value), abs(one%norm * one%value), abs(one%value)]
       end associate
     end do
-    self%scale(of_mode * size(self%criticals) + 1:) = [(self%halves(i)%lines%half_range, i=1, size(self%halves))]
+    do i = 1, size(self%parts%halves)
+      self%scale(of_mode * size(self%parts%criticals) + i) = self%parts%halves(i)%lines%half_range
+    end do
   end subroutine new_response_answers
-
-  !> The machine as a response looks at it.
-  subroutine assemble(input, machine, error)
-    type(input_t), intent(in) :: input
-    type(machine_t), intent(out) :: machine
-    type(error_t), allocatable, intent(out) :: error
-    logical :: sets_speed
-
-    sets_speed = .true.
-    if (size(input%groups_named('response')) > 0) then
-      sets_speed = .not. input%groups(input%position('response'))%has_value('frequency')
-    end if
-    call assemble_steady_machine(input, .true., machine, error, sets_speed=sets_speed)
-  end subroutine assemble
 
   !> The critical speeds whose modes are differentiated: those of motions, the ones with the largest ratios to limits, or half
   !> ranges, first; in the order of the report.
@@ -154,6 +117,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(held_speeds_t) :: held
     type(held_state_t) :: state
+    type(listed_harmonic_t), allocatable :: list(:)
     type(mode_pairs_t) :: pairs
     type(view_t) :: view
     real(wp) :: change(points), slopes(of_mode), values(of_mode, points), weight(points), weight_here
@@ -161,12 +125,14 @@ contains
 
     one%critical = critical
     one%line = critical%crossing%line
-    associate (response => self%analysis%response, speed => critical%crossing%speed)
+    associate (response => self%parts%analysis%response, speed => critical%crossing%speed)
       held = response%held
       call held%hold(speed, state, error)
       if (.not. allocated(error)) call find_pairs_at(response, state, pairs, error)
       if (allocated(error)) return
-      one%state = state
+      call freeze_held(held, state, one%frozen)
+      call list_machine_harmonics(response%machine, state, list, response%shaker)
+      one%source = list(response%lines(one%line)%source(1))
       m = minloc(abs(aimag(pairs%value) - critical%crossing%frequency) &
                  + abs(real(pairs%value, wp) + critical%crossing%damping_ratio * abs(pairs%value)), dim=1)
       one%value = pairs%value(m)
@@ -175,17 +141,17 @@ contains
       one%motion%angle = pairs%angle(:, m)
       one%norm = one%motion%form_of_slope(one%motion, response%machine, state%slopes, one%value)
       one%turn = one%motion%form_of_frequency(one%motion, state%slopes, one%value)
-      view = new_view(self%frame, response%machine)
+      view = new_view(self%parts%frame, response%machine)
       change = speed_step * speed * central
-      call sixth_order(change, weight, weight_here)
+      call find_weights(change, weight, weight_here)
       do p = 1, points
         call held%hold(speed + change(p), state, error)
         if (allocated(error)) return
-        call evaluate_critical(self, one, view, response%machine, state, values(:, p))
+        call evaluate_critical(self%parts, one, view, response%machine, state, .false., values(:, p))
       end do
       slopes = matmul(values, weight)
       one%approach = slopes(3) - aimag(eigenvalue_change(one%norm, one%turn, cmplx(slopes(1), slopes(2), wp)))
-      associate (settings => self%analysis%settings)
+      associate (settings => self%parts%analysis%settings)
         one%has_margin = size(settings%operating) > 0
         if (.not. one%has_margin) return
         one%margin_slope = 0.0_wp   ! inside
@@ -195,22 +161,6 @@ contains
     end associate
   end subroutine find_critical
 
-  !> The form of the mode of a critical speed in a changed machine or state, and the frequency of its line.
-  subroutine evaluate_critical(self, one, view, machine, state, values)
-    type(response_answers_t), intent(in) :: self
-    type(critical_answers_t), intent(in) :: one
-    type(view_t), intent(in) :: view
-    type(machine_t), intent(in) :: machine
-    type(held_state_t), intent(in) :: state
-    real(wp), intent(out) :: values(:)
-    complex(wp) :: form
-    type(source_t), allocatable :: sources(:)
-
-    form = one%motion%form(one%motion, self%frame, view, machine, state%slopes, one%value)
-    call list_sources(machine, state, sources, self%analysis%response%shaker)
-    values = [real(form, wp), aimag(form), sources(self%analysis%response%lines(one%line)%source(1))%frequency]
-  end subroutine evaluate_critical
-
   !> The half ranges: at the peaks of the critical speeds, and the largest of every quantity with a limit.
   subroutine list_halves(self, summary, error)
     type(response_answers_t), intent(inout) :: self
@@ -219,17 +169,17 @@ contains
     type(half_range_answer_t), allocatable :: halves(:)
     integer :: i, n, q
 
-    associate (response => self%analysis%response)
-      call list_moment_forms(response%machine, self%analysis%settings%body, self%forms)
-      allocate (halves(size(self%criticals) + size(response%quantities)))
+    associate (response => self%parts%analysis%response)
+      call list_moment_forms(response%machine, self%parts%analysis%settings%body, self%parts%forms)
+      allocate (halves(size(self%parts%criticals) + size(response%quantities)))
       n = 0
-      do i = 1, size(self%criticals)
-        associate (critical => self%criticals(i)%critical)
+      do i = 1, size(self%parts%criticals)
+        associate (critical => self%parts%criticals(i)%critical)
           if (critical%quantity == 0 .or. critical%is_unbounded) cycle
           n = n + 1
           halves(n)%critical = i
           halves(n)%speed = critical%speed
-          halves(n)%lines%form = number_of(response%quantities(critical%quantity), self%forms)
+          halves(n)%lines%form = number_of(response%quantities(critical%quantity), self%parts%forms)
         end associate
       end do
       do q = 1, size(response%quantities)
@@ -237,14 +187,14 @@ contains
         n = n + 1
         halves(n)%speed = response%points(summary%largest(q)%ratio_point)%state%speed
         halves(n)%critical = critical_at(self, halves(n)%speed)
-        halves(n)%lines%form = number_of(response%quantities(q), self%forms)
+        halves(n)%lines%form = number_of(response%quantities(q), self%parts%forms)
       end do
-      allocate (self%halves(n))
+      allocate (self%parts%halves(n))
       do i = 1, n
-        self%halves(i)%speed = halves(i)%speed
-        self%halves(i)%critical = halves(i)%critical
-        self%halves(i)%lines%form = halves(i)%lines%form
-        call find_half(self, self%forms(halves(i)%lines%form), self%halves(i), error)
+        self%parts%halves(i)%speed = halves(i)%speed
+        self%parts%halves(i)%critical = halves(i)%critical
+        self%parts%halves(i)%lines%form = halves(i)%lines%form
+        call find_half(self, self%parts%forms(halves(i)%lines%form), self%parts%halves(i), error)
         if (allocated(error)) return
       end do
     end associate
@@ -270,8 +220,8 @@ contains
 
     found = 0
     nearest = huge(nearest)
-    do i = 1, size(self%criticals)
-      associate (crossing => self%criticals(i)%critical%crossing)
+    do i = 1, size(self%parts%criticals)
+      associate (crossing => self%parts%criticals(i)%critical%crossing)
         distance = abs(speed - crossing%speed)
         if (distance > (near + 3.0_wp * crossing%damping_ratio) * abs(crossing%speed) .or. distance >= nearest) cycle
       end associate
@@ -293,98 +243,26 @@ contains
     real(wp) :: change(points), values(points), weight(points), weight_here
     integer :: p
 
-    associate (response => self%analysis%response)
+    associate (response => self%parts%analysis%response)
       held = response%held
       call held%hold(half%speed, state, error)
       if (allocated(error)) return
-      call list_sources(response%machine, state, sources, response%shaker)
-      half%state = state
+      call freeze_held(held, state, half%frozen)
+      call list_machine_harmonics(response%machine, state, half%harmonics, response%shaker)
+      call set_sources(half%harmonics, state, sources)
       call new_line_responses(response, state, sources, quantity, half%lines)
       if (half%critical == 0) return
-      view = new_view(self%frame, response%machine)
+      view = new_view(self%parts%frame, response%machine)
       change = speed_step * half%speed * central
-      call sixth_order(change, weight, weight_here)
+      call find_weights(change, weight, weight_here)
       do p = 1, points
         call held%hold(half%speed + change(p), state, error)
         if (allocated(error)) return
-        call list_sources(response%machine, state, sources, response%shaker)
-        values(p) = half%lines%changed(response, self%frame, view, response%machine, state, sources, quantity)
+        call evaluate_half(self%parts, half, view, response%machine, self%parts%forms, state, .false., values(p))
       end do
       half%slope = sum(weight * values)
     end associate
   end subroutine find_half
-
-  subroutine evaluate(self, input, key, point, values, error)
-    class(response_answers_t), intent(in) :: self
-    type(input_t), intent(in) :: input
-    type(varied_key_t), intent(in) :: key
-    integer, intent(in) :: point
-    real(wp), intent(out) :: values(:)
-    type(error_t), allocatable, intent(out) :: error
-    type(held_speeds_t) :: held
-    type(machine_t) :: machine
-    type(moment_form_t), allocatable :: forms(:)
-    type(quick_change_t) :: quick
-    type(view_t) :: view
-
-    associate (response => self%analysis%response)
-      values = 0.0_wp
-      quick = new_quick_change(input, key, response%machine, response%held)
-      if (quick%body > 0) then
-        machine = response%machine
-        machine%inertia(1, quick%body) = machine%inertia(1, quick%body) + (key%at(point) - key%value)
-        call evaluate_changed(self, view, machine, self%forms, values, error)
-        return
-      end if
-      if (quick%is_of_elements) then
-        held = response%held
-        call quick%change_held(key%at(point), held)
-        call evaluate_changed(self, view, response%machine, self%forms, values, error, held)
-        return
-      end if
-      call assemble(input, machine, error)
-      if (allocated(error)) return
-      view = new_view(self%frame, machine)
-      if (.not. view%is_alike) then
-        call raise(error, exit_failed, 'it changes the coordinates or the nodes of shafts')
-        return
-      end if
-      call new_held_speeds(machine, self%analysis%settings%body, held, error, is_free=response%shaker > 0)
-      if (allocated(error)) return
-      call list_moment_forms(machine, self%analysis%settings%body, forms)
-      call evaluate_changed(self, view, machine, forms, values, error, held)
-    end associate
-  end subroutine evaluate
-
-  !> The functionals of a changed machine.
-  subroutine evaluate_changed(self, view, machine, forms, values, error, held)
-    class(response_answers_t), intent(in) :: self
-    type(view_t), intent(in) :: view
-    type(machine_t), intent(in) :: machine
-    type(moment_form_t), intent(in) :: forms(:)   !! of the machine
-    real(wp), intent(out) :: values(:)
-    type(error_t), allocatable, intent(out) :: error
-    type(held_speeds_t), intent(inout), optional :: held   !! its steady states; absent: they are as before the change
-    type(held_state_t) :: state
-    type(source_t), allocatable :: sources(:)
-    integer :: i
-
-    do i = 1, size(self%criticals)
-      state = self%criticals(i)%state
-      if (present(held)) call held%hold(self%criticals(i)%critical%crossing%speed, state, error)
-      if (allocated(error)) return
-      call evaluate_critical(self, self%criticals(i), view, machine, state, values(of_mode * (i - 1) + 1:of_mode * i))
-    end do
-    do i = 1, size(self%halves)
-      state = self%halves(i)%state
-      if (present(held)) call held%hold(self%halves(i)%speed, state, error)
-      if (allocated(error)) return
-      call list_sources(machine, state, sources, self%analysis%response%shaker)
-      values(of_mode * size(self%criticals) + i) = &
-        self%halves(i)%lines%changed(self%analysis%response, self%frame, view, machine, state, sources, &
-                                     forms(self%halves(i)%lines%form))
-    end do
-  end subroutine evaluate_changed
 
   !> The answers without their derivatives.
   subroutine name_answers(self)
@@ -393,15 +271,15 @@ contains
     integer :: i, n, unit
     character(len=16) :: name
 
-    allocate (self%answers(count(self%criticals%has_margin) + size(self%criticals) + size(self%halves)))
+    allocate (self%answers(count(self%parts%criticals%has_margin) + size(self%parts%criticals) + size(self%parts%halves)))
     n = 0
-    do i = 1, size(self%criticals)
-      associate (one => self%criticals(i))
+    do i = 1, size(self%parts%criticals)
+      associate (one => self%parts%criticals(i))
         n = n + 1
         one%answer = n
         unit = unit_rpm
         name = 'critical speed'
-        if (self%analysis%settings%axis%is_frequency) then
+        if (self%parts%analysis%settings%axis%is_frequency) then
           unit = unit_hz
           name = 'resonance'
         end if
@@ -410,17 +288,17 @@ contains
         if (.not. one%has_margin) cycle
         n = n + 1
         call self%answers(n)%set('margin', critical_label(self, one), '', &
-                                 operating_distance(self%analysis%settings, one%critical%crossing%speed), is_share=.true.)
+                                 operating_distance(self%parts%analysis%settings, one%critical%crossing%speed), is_share=.true.)
       end associate
     end do
-    do i = 1, size(self%halves)
-      associate (half => self%halves(i), form => self%forms(self%halves(i)%lines%form))
+    do i = 1, size(self%parts%halves)
+      associate (half => self%parts%halves(i), form => self%parts%forms(self%parts%halves(i)%lines%form))
         n = n + 1
         half%answer = n
         label = form%name // ' at '
         if (i <= count_peaks(self)) then
-          label = label // critical_label(self, self%criticals(half%critical))
-        else if (self%analysis%settings%axis%is_frequency) then
+          label = label // critical_label(self, self%parts%criticals(half%critical))
+        else if (self%parts%analysis%settings%axis%is_frequency) then
           label = label // rounded_text(from_si(half%speed, unit_hz), 6) // ' Hz, nearest to its limit'
         else
           label = label // rounded_text(from_si(half%speed, unit_rpm), 6) // ' rpm, nearest to its limit'
@@ -434,7 +312,7 @@ contains
   pure integer function count_peaks(self) result(peaks)
     type(response_answers_t), intent(in) :: self
 
-    peaks = count(self%criticals%critical%quantity > 0 .and. .not. self%criticals%critical%is_unbounded)
+    peaks = count(self%parts%criticals%critical%quantity > 0 .and. .not. self%parts%criticals%critical%is_unbounded)
   end function count_peaks
 
   !> "mode 1, order 4.5".
@@ -444,8 +322,8 @@ contains
     character(len=:), allocatable :: label
 
     label = 'mode ' // to_text(one%critical%crossing%number)
-    if (self%analysis%settings%axis%is_frequency) return
-    associate (line => self%analysis%response%lines(one%line))
+    if (self%parts%analysis%settings%axis%is_frequency) return
+    associate (line => self%parts%analysis%response%lines(one%line))
       if (line%is_order) then
         label = label // ', order ' // line%word()
       else
@@ -454,26 +332,45 @@ contains
     end associate
   end function critical_label
 
+  subroutine differentiate_near(self, number, slopes, is_done, error)
+    class(response_answers_t), intent(inout) :: self
+    type(number_change_t), intent(inout) :: number
+    real(wp), intent(out) :: slopes(:)
+    logical, intent(out) :: is_done
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%parts%differentiate_near(number, slopes, is_done, error)
+  end subroutine differentiate_near
+
+  subroutine evaluate(self, number, values, error)
+    class(response_answers_t), intent(in) :: self
+    type(number_change_t), intent(in) :: number
+    real(wp), intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+
+    call self%parts%evaluate(number, values, error)
+  end subroutine evaluate
+
   subroutine finish(self, slopes)
     class(response_answers_t), intent(inout) :: self
     real(wp), intent(in) :: slopes(:, :)
-    real(wp) :: speed(size(slopes, 2), size(self%criticals))
+    real(wp) :: speed(size(slopes, 2), size(self%parts%criticals))
     integer :: i, n
 
-    do i = 1, size(self%criticals)
-      associate (one => self%criticals(i), first => of_mode * (i - 1), answer => self%criticals(i)%answer)
+    do i = 1, size(self%parts%criticals)
+      associate (one => self%parts%criticals(i), first => of_mode * (i - 1), answer => self%parts%criticals(i)%answer)
         speed(:, i) = (aimag(eigenvalue_change(one%norm, one%turn, cmplx(slopes(first + 1, :), slopes(first + 2, :), wp))) &
                        - slopes(first + 3, :)) / one%approach
-        n = merge(unit_hz, unit_rpm, self%analysis%settings%axis%is_frequency)
+        n = merge(unit_hz, unit_rpm, self%parts%analysis%settings%axis%is_frequency)
         self%answers(answer)%derivative = from_si(speed(:, i), n)
         if (one%has_margin) then
           self%answers(answer + 1)%derivative = one%margin_slope * sign(1.0_wp, one%critical%crossing%speed) * speed(:, i)
         end if
       end associate
     end do
-    do i = 1, size(self%halves)
-      associate (half => self%halves(i))
-        self%answers(half%answer)%derivative = slopes(of_mode * size(self%criticals) + i, :)
+    do i = 1, size(self%parts%halves)
+      associate (half => self%parts%halves(i))
+        self%answers(half%answer)%derivative = slopes(of_mode * size(self%parts%criticals) + i, :)
         if (half%critical == 0) cycle
         self%answers(half%answer)%derivative = self%answers(half%answer)%derivative + half%slope * speed(:, half%critical)
       end associate

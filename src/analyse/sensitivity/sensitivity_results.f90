@@ -1,7 +1,7 @@
 !> Derivatives of what analyses answer by the numbers of a machine, as an analysis: sensitivity.csv and sensitivity.json.
 module nocdyn_sensitivity_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
-  use nocdyn_answers, only: answer_t, differentiate
+  use nocdyn_answers, only: answer_t, differentiate, group_t
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -33,8 +33,10 @@ contains
     type(machine_t), intent(in) :: machine
     type(analysis_options_t), intent(in) :: options
     type(error_t), allocatable, intent(out) :: error
-    type(mode_answers_t) :: modes
-    type(response_answers_t) :: response
+    type(mode_answers_t), target :: modes
+    type(response_answers_t), target :: response
+    type(group_t) :: groups(2)
+    integer :: count
     character(len=:), allocatable :: at
 
     at = 'equilibrium'
@@ -48,17 +50,24 @@ contains
     call list_varied_keys(input, self%found%keys, self%found%notes)
     call new_mode_answers(input, at, modes_choice_t(options%modes, options%has_range, options%range_hz), modes, &
                           self%found%notes, error)
-    if (.not. allocated(error)) call differentiate(input, self%found%keys, modes, self%found%notes, error)
     if (allocated(error)) then
       error%message = input%shown_case() // ': ' // error%message
       return
     end if
+    count = 1
+    groups(1)%answers => modes
     if (size(input%groups_named('response')) > 0) then
       call new_response_answers(input, most_criticals, response, self%found%notes, error)
-      if (.not. allocated(error)) call differentiate(input, self%found%keys, response, self%found%notes, error)
       if (allocated(error)) return
-      call add_answers(response%answers, self%found%answers)
+      count = 2
+      groups(2)%answers => response
     end if
+    call differentiate(input, machine, self%found%keys, groups(:count), self%found%notes, error)
+    if (allocated(error)) then
+      error%message = input%shown_case() // ': ' // error%message
+      return
+    end if
+    if (count == 2) call add_answers(response%answers, self%found%answers)
     call add_answers(modes%answers, self%found%answers)
   end subroutine solve
 

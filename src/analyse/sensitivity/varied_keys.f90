@@ -1,9 +1,10 @@
 !> The numbers of a machine by which its answers are differentiated: all that an input gives, one by one.
 !>
-!> A number p enters by central differences of the sixth order: what is differentiated is evaluated for the machines of the input
-!> with p + k h, k = -3 ... 3, and everything else, motions and eigenvectors, stays as it is. The numbers of a linear machine are
-!> smooth functions of those of the input, mostly powers, so that such a difference has ten digits and more. Where a key does not
-!> allow p + k h on one side, the six points are on the other one.
+!> What is differentiated is evaluated for the machines of the input with numbers p + k h beside p, and everything else, motions
+!> and eigenvectors, stays as it is. The numbers of a linear machine are smooth functions of those of the input, mostly powers:
+!> where the steady state stays too, nothing is iterated, and two points have nine digits (h = 4e-6 p). Where it is found anew,
+!> differences of the sixth order over k = -3 ... 3 keep its tolerance small (h = 2e-3 p). Where a key does not allow p + k h on
+!> one side, the points are on the other one.
 module nocdyn_varied_keys
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -16,11 +17,13 @@ module nocdyn_varied_keys
   implicit none (type, external)
   private
 
-  public :: list_varied_keys, set_key, sixth_order
+  public :: find_weights, list_varied_keys, set_key
 
-  integer, parameter, public :: points = 6                   !! of a difference
+  integer, parameter, public :: points = 6                   !! of a difference with steady states that are found anew
+  integer, parameter, public :: near_points = 2              !! of one with states that stay
   integer, parameter :: most_of_a_list = 12                  ! numbers of a list that are looked at one by one
   real(wp), parameter :: relative_step = 2.0e-3_wp           ! h, as a share of the number; of angles at least [rad]
+  real(wp), parameter :: near_step = 4.0e-6_wp               ! the same of near points; of angles [rad]
   integer, parameter, public :: central(points) = [-3, -2, -1, 1, 2, 3]
   integer, parameter :: one_sided(points) = [1, 2, 3, 4, 5, 6]
 
@@ -33,8 +36,9 @@ module nocdyn_varied_keys
     real(wp) :: change(points) = 0.0_wp     !! of the number at each point
     real(wp) :: weight(points) = 0.0_wp     !! of the derivative at its value
     real(wp) :: weight_here = 0.0_wp        !! of the value itself; 0 where the points are on both sides
-  contains
-    procedure :: at
+    real(wp) :: near(near_points) = 0.0_wp           !! the same for near points
+    real(wp) :: near_weight(near_points) = 0.0_wp
+    real(wp) :: near_weight_here = 0.0_wp
   end type varied_key_t
 
 contains
@@ -139,7 +143,13 @@ contains
       if (is_possible) call try_change(input, key, minval(key%change), is_possible)
       if (is_possible) exit
     end do
-    if (is_possible) call sixth_order(key%change, key%weight, key%weight_here)
+    if (.not. is_possible) return
+    call find_weights(key%change, key%weight, key%weight_here)
+    step = near_step * abs(key%value)
+    if (rule%unit == 'rad') step = near_step
+    key%near = step * [-1, 1]
+    if (side > 0) key%near = sign(step, key%change(1)) * one_sided(:near_points)
+    call find_weights(key%near, key%near_weight, key%near_weight_here)
   end subroutine find_key
 
   !> Whether a key may have a changed number.
@@ -155,17 +165,17 @@ contains
     call set_targets(input, [key%target], [key%value], again)
   end subroutine try_change
 
-  !> The weights of six points, and of the point between or beside them, with which polynomials of the sixth degree are
+  !> The weights of points, and of the point between or beside them, with which polynomials of a degree that is their number are
   !> differentiated exactly.
-  subroutine sixth_order(change, weight, weight_here)
-    real(wp), intent(in) :: change(points)    !! at which the function is evaluated, none of them 0
-    real(wp), intent(out) :: weight(points), weight_here
-    real(wp) :: powers(points, points), scale
-    integer :: k, pivots(points)
+  subroutine find_weights(change, weight, weight_here)
+    real(wp), intent(in) :: change(:)    !! at which the function is evaluated, none of them 0
+    real(wp), intent(out) :: weight(:), weight_here
+    real(wp) :: powers(size(change), size(change)), scale
+    integer :: k, pivots(size(change))
     logical :: is_singular
 
     scale = maxval(abs(change))
-    do k = 1, points
+    do k = 1, size(change)
       powers(k, :) = (change / scale)**k
     end do
     weight = 0.0_wp
@@ -174,25 +184,16 @@ contains
     call lu_solve(powers, pivots, weight)
     weight_here = -sum(weight)
     if (abs(sum(change)) <= epsilon(scale) * scale) weight_here = 0.0_wp
-  end subroutine sixth_order
+  end subroutine find_weights
 
-  !> Gives a number of an input its value at a point.
-  subroutine set_key(input, key, point)
+  !> Changes a number of an input.
+  subroutine set_key(input, key, change)
     type(input_t), intent(inout) :: input
     type(varied_key_t), intent(in) :: key
-    integer, intent(in) :: point   !! 0 is the number itself
+    real(wp), intent(in) :: change   !! of the number
     character(len=:), allocatable :: message
 
-    call set_targets(input, [key%target], [key%at(point)], message)
+    call set_targets(input, [key%target], [key%value + change], message)
   end subroutine set_key
-
-  !> The number at a point.
-  pure real(wp) function at(self, point)
-    class(varied_key_t), intent(in) :: self
-    integer, intent(in) :: point   !! 0 is the number itself
-
-    at = self%value
-    if (point > 0) at = at + self%change(point)
-  end function at
 
 end module nocdyn_varied_keys

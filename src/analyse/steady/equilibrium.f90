@@ -21,7 +21,7 @@ module nocdyn_equilibrium
   implicit none (type, external)
   private
 
-  public :: distances, find_equilibria, find_stability, mean_formulation, nearest_equilibrium
+  public :: distances, find_equilibria, find_stability, mean_formulation, mean_machine, nearest_equilibrium
 
   real(wp), parameter, public :: t_infinity = 1.0e30_wp   !! a time after all transients of the excitations [s]
 
@@ -217,19 +217,28 @@ contains
     class(formulation_t), allocatable, intent(out) :: formulation
     logical, intent(in), optional :: holds_speed   !! whether governors and supplies leave the speed to who holds it; absent: no
     type(reduced_t), allocatable :: reduced
-    integer :: b
+    logical :: is_held
 
+    is_held = .false.
+    if (present(holds_speed)) is_held = holds_speed
     allocate (reduced)
     reduced%machine = machine
-    call reduced%machine%to_mean_torque()
-    if (present(holds_speed)) then
-      do b = 1, merge(size(machine%banks), 0, holds_speed)
-        call reduced%machine%banks(b)%bank%hold_speed()
-      end do
-    end if
+    call mean_machine(reduced%machine, is_held)
     call reduced%formulate(.false.)
     call move_alloc(reduced, formulation)
   end subroutine mean_formulation
+
+  !> Replaces the torques of a machine by their means.
+  subroutine mean_machine(machine, holds_speed)
+    type(machine_t), intent(inout) :: machine
+    logical, intent(in) :: holds_speed   !! as in `mean_formulation`
+    integer :: b
+
+    call machine%to_mean_torque()
+    do b = 1, merge(size(machine%banks), 0, holds_speed)
+      call machine%banks(b)%bank%hold_speed()
+    end do
+  end subroutine mean_machine
 
   !> Determines the stability of every steady state.
   subroutine find_stability(formulation, t, equilibria)

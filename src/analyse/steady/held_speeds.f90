@@ -48,20 +48,22 @@ module nocdyn_held_speeds
   type, public :: held_speeds_t
     type(torque_balance_t) :: balance        !! of the machine with mean torques
     integer :: reference = 0                 !! body whose speed is held
-    integer, allocatable, private :: sources(:)      !! elements whose torques are multiplied, numbered in `balance%inelastic`
-    real(wp), allocatable, private :: ratio(:)       !! speed of the reference body by the rigid motions, [freedoms]
+    integer, allocatable :: sources(:)               !! elements whose torques are multiplied, numbered in `balance%inelastic`
+    real(wp), allocatable :: ratio(:)                !! speed of the reference body by the rigid motions, [freedoms]
     real(wp), allocatable, private :: z(:)           !! last rigid motions and internal states
     real(wp), allocatable, private :: q(:)           !! last angles of the coordinates [rad]
     type(twist_problem_t), private :: twists
     real(wp), private :: last_speed = 0.0_wp         !! of these
-    real(wp), allocatable, private :: carried(:)     !! speeds of the bodies that a drive turns with the reference body, per speed
+    real(wp), allocatable :: carried(:)              !! speeds of the bodies that a drive turns with the reference body, per speed
                                                      !! of that; not allocated: no drive turns it, [bodies]
-    logical, private :: is_free = .false.            !! whether nothing holds the speed: there is one steady state
+    logical :: is_free = .false.                     !! whether nothing holds the speed: there is one steady state
     type(held_state_t), allocatable, private :: steady   !! this one, once it is found
     real(wp), allocatable, private :: beside(:)      !! speeds that other drives give the bodies [rad/s], [bodies]
-    logical, private :: motors_hold = .false.        !! whether the motors hold the speed, else a torque
+    logical :: motors_hold = .false.                 !! whether the motors hold the speed, else a torque
     logical :: supply_holds = .false.                !! whether they do so by the frequency of their supply
     logical :: lacks_twists = .false.                !! whether the torques balanced in the last search, but no twists carry them
+    real(wp), allocatable :: weight(:)               !! of the last state on the moments, [elements]
+    real(wp) :: lead = 0.0_wp                        !! of the last state: angle over speed of the reference body [s]
     real(wp), private :: slip = 0.0_wp               !! last share of the frequency beyond that without slip of the first motor
   contains
     procedure :: hold, has_drive, forget
@@ -195,10 +197,8 @@ contains
       call set_supplies(self%balance, share)
       call residuals(self, z, moved, sources, scale)
       missing = -(moved + sources)
-      if (is_found .or. all(abs(missing) <= tolerance * scale)) then
-        is_found = .true.
-        return
-      end if
+      is_found = is_found .or. all(abs(missing) <= tolerance * scale)
+      if (is_found) return
       do k = 1, size(missing)
         matrix(:, k) = (matrix(:, k) + missing) / merge(difference, difference * abs(speed), k == pivot)
       end do
@@ -371,9 +371,7 @@ contains
     associate (machine => self%balance%formulation%machine)
       if (allocated(machine%driven_speed)) driven = machine%driven_speed(self%reference)
     end associate
-    associate (r => size(self%ratio))
-      z(pivot) = z(pivot) + (speed - driven - sum(self%ratio * z(:r))) / self%ratio(pivot)
-    end associate
+    z(pivot) = z(pivot) + (speed - driven - sum(self%ratio * z(:size(self%ratio)))) / self%ratio(pivot)
   end subroutine impose
 
   !> The torques that are missing for the balance, and their derivatives by the rigid motions, and in the column `pivot` by what
@@ -467,6 +465,7 @@ contains
     if (self%motors_hold) then
       call close_speed_loops(self%balance, self%balance%inelastic(self%sources), state%factor, z, weight)
     end if
+    self%weight = weight
     call linearise(self, z, weight, state, error)
   end subroutine find_state
 
@@ -477,7 +476,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call self%balance%set_state(z)
-    associate (balance => self%balance, formulation => self%balance%formulation)
+    associate (balance => self%balance, formulation => self%balance%formulation, &
+               elements => self%balance%formulation%state%elements)
       balance%y(1, balance%coordinates + 1:2 * balance%coordinates) = self%q
       call formulation%gather(balance%y)
       call formulation%state%choose_branches(formulation%machine, balance%t)
@@ -486,15 +486,14 @@ contains
       state%omega = formulation%omega(1, 1:)
       state%phi = formulation%phi(1, 1:)
       if (.not. self%is_free) then
-        state%phi = state%phi - state%omega * (state%phi(self%reference) / state%omega(self%reference))
+        self%lead = state%phi(self%reference) / state%omega(self%reference)
+        state%phi = state%phi - self%lead * state%omega
       end if
-    end associate
-    associate (elements => self%balance%formulation%state%elements)
       state%twist = elements%angle(1, :)
       state%rate = elements%speed(1, :)
       state%mean = weight * (elements%restoring(1, :) + elements%applied(1, :))
+      call new_slopes(formulation%machine, elements, state%slopes, error, weight)
     end associate
-    call new_slopes(self%balance%formulation%machine, self%balance%formulation%state%elements, state%slopes, error, weight)
   end subroutine linearise
 
 end module nocdyn_held_speeds
