@@ -152,6 +152,144 @@ def test_derivatives_of_a_chain_are_those_of_exact_numbers(nocdyn, seed):
                 assert abs(one["by"][path] - expected) * value <= 1e-8 * (abs(one["value"]) or 1), (one["kind"], one["of"], path)
 
 
+DRIVES = {
+    "motor": {"motor.d.a": 900.0, "motor.d.b": 3.0},
+    "governor": {"motor.d.a": 900.0, "motor.d.b": 3.0, "motor.d.governor_gain": 0.01, "motor.d.governor_time": 0.7},
+    "torque": {},
+}
+SET_SPEED = 90.0
+
+
+def bent_text(numbers, drive):
+    """A motor, a coupling with a cubic law and a load; the speed is held by the motor, by its throttle or by a torque."""
+
+    def keys(name):
+        return " ".join(f"{key.split('.')[2]} = {value!r}" for key, value in numbers.items() if key.startswith(name))
+
+    text = (
+        f"&body name = 'm' {keys('body.m')} speed = 95 /\n&body name = 'l' {keys('body.l')} /\n"
+        f"&coupling name = 'k' bodies = 'm', 'l' {keys('coupling.k')} /\n&load name = 'w' body = 'l' {keys('load.w')} /\n"
+        f"&excitation name = 'e' body = 'm' kind = 'orders' orders = {ORDER} amplitudes = {TORQUE} /\n"
+        "&response body = 'm' speed = 30, 150 count = 200 operating = 120, 140 /\n&run t_end = 1 /\n"
+    )
+    if drive != "torque":
+        governor = f"governor_speed = {SET_SPEED}" if drive == "governor" else ""
+        text += f"&motor name = 'd' body = 'm' {keys('motor.d')} c = 0 {governor} /\n"
+    return text
+
+
+class Bent:
+    """The same machine with exact numbers."""
+
+    def __init__(self, numbers, drive):
+        self.drive = drive
+        for path, value in numbers.items():
+            setattr(self, path.replace(".", "_"), mpmath.mpf(value))
+
+    def load(self, n):
+        return self.load_w_viscous * n + self.load_w_quadratic * n**2
+
+    def free_speed(self):
+        if self.drive == "torque":
+            return mpmath.mpf(0)
+        if self.drive == "governor":
+            return mpmath.mpf(SET_SPEED)
+        return mpmath.findroot(lambda n: self.motor_d_a - self.motor_d_b * n - self.load(n), 100)
+
+    def terms(self, value, n):
+        """The stiffness of the coupling and what the motor adds, at a speed and for motions exp(value t)."""
+        k, cubic = self.coupling_k_stiffness, self.coupling_k_cubic_stiffness
+        twist = mpmath.findroot(lambda u: k * u + cubic * u**3 - self.load(n), self.load(n) / k)
+        slope = k + 3 * cubic * twist**2
+        d = slope + value * self.coupling_k_damping
+        d += value / mpmath.im(value) * slope * self.coupling_k_relative_damping / (2 * mpmath.pi)
+        driving = mpmath.mpf(0)
+        if self.drive != "torque":
+            full = self.motor_d_a - self.motor_d_b * n
+            driving = self.load(n) / full * self.motor_d_b
+            if self.drive == "governor":
+                driving += full * self.motor_d_governor_gain * (1 + 1 / (value * self.motor_d_governor_time))
+        return d, value * driving
+
+    def matrix(self, value, n):
+        d, driving = self.terms(value, n)
+        braking = value * (self.load_w_viscous + 2 * self.load_w_quadratic * n)
+        return mpmath.matrix(
+            [
+                [value**2 * self.body_m_inertia + driving + d, -d],
+                [-d, value**2 * self.body_l_inertia + braking + d],
+            ]
+        )
+
+    def eigenvalue(self, start):
+        n = self.free_speed()
+        scale = mpmath.det(self.matrix(start * mpmath.mpc(1, "0.2"), n))
+
+        def residual(real, imaginary):
+            determinant = mpmath.det(self.matrix(mpmath.mpc(real, imaginary), n)) / scale
+            return [mpmath.re(determinant), mpmath.im(determinant)]
+
+        found = mpmath.findroot(residual, (mpmath.re(start), mpmath.im(start)), tol=mpmath.mpf(10) ** (8 - 2 * DIGITS))
+        return mpmath.mpc(found[0], found[1])
+
+    def critical(self, start):
+        """The speed at which the mode has the frequency of the order, and its decay."""
+        scale = mpmath.det(self.matrix(mpmath.mpc("0.1", ORDER * start[1]), start[1]))
+
+        def residual(real, n):
+            determinant = mpmath.det(self.matrix(mpmath.mpc(real, ORDER * n), n)) / scale
+            return [mpmath.re(determinant), mpmath.im(determinant)]
+
+        return tuple(mpmath.findroot(residual, start, tol=mpmath.mpf(10) ** (8 - 2 * DIGITS)))
+
+    def amplitude(self, n):
+        value = mpmath.mpc(0, ORDER * n)
+        motion = mpmath.lu_solve(self.matrix(value, n), mpmath.matrix([mpmath.mpf(TORQUE), 0]))
+        return abs(self.terms(value, n)[0] * (motion[1] - motion[0]))
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_derivatives_of_bent_states_are_those_of_exact_numbers(nocdyn, drive):
+    """Every number moves the steady state, by whatever holds the speed: modes about the free state, a response at held ones."""
+    numbers = {
+        "body.m.inertia": 2.3, "body.l.inertia": 1.7, "coupling.k.stiffness": 2.0e4, "coupling.k.cubic_stiffness": 4.0e6,
+        "coupling.k.damping": 2.5, "coupling.k.relative_damping": 0.3, "load.w.quadratic": 0.04, "load.w.viscous": 0.8,
+    } | DRIVES[drive]  # fmt: skip
+    answers, report = sensitivity(nocdyn, bent_text(numbers, drive))
+    assert not report["notes"]
+    nocdyn.done(bent_text(numbers, drive), command="response")
+    place = json.loads((nocdyn.folder / "out/response.json").read_text())["critical_speeds"][0]
+    known = {one["kind"]: one["value"] for one in answers}
+    assert set(known) == {"frequency", "damping ratio", "critical speed", "margin", "half range"}
+    with mpmath.workdps(DIGITS):
+        ratio = known["damping ratio"]
+        size = known["frequency"] * TURN / mpmath.sqrt(1 - ratio**2)
+        here = Bent(numbers, drive)
+        value = here.eigenvalue(size * mpmath.mpc(-ratio, mpmath.sqrt(1 - ratio**2)))
+        critical = here.critical((mpmath.re(value), mpmath.mpf(place["speed_rad_s"])))
+        beside = place["peak_speed_rad_s"] - critical[1]
+
+        def all_answers(path=None, sign=0):
+            changed = {key: mpmath.mpf(number) * (1 + sign * STEP * (key == path)) for key, number in numbers.items()}
+            machine = Bent(changed, drive)
+            mode, meeting = machine.eigenvalue(value), machine.critical(critical)
+            return {
+                "frequency": mpmath.im(mode) / TURN,
+                "damping ratio": -mpmath.re(mode) / abs(mode),
+                "critical speed": meeting[1] * 60 / TURN,
+                "margin": (120 - meeting[1]) / 120,
+                "half range": machine.amplitude(meeting[1] + beside),
+            }
+
+        for kind, exact in all_answers().items():
+            assert known[kind] == pytest.approx(float(exact), rel=1e-9), kind
+        for path, number in numbers.items():
+            high, low = all_answers(path, 1), all_answers(path, -1)
+            for one in answers:
+                expected = float((high[one["kind"]] - low[one["kind"]]) / (2 * STEP * mpmath.mpf(number)))
+                assert abs(one["by"][path] - expected) * number <= 1e-8 * abs(one["value"]), (one["kind"], path, expected)
+
+
 CURVED = """\
 &body name = 'motor' inertia = 10 speed = 100 /
 &body name = 'pinion' inertia = 1.5 /

@@ -42,7 +42,6 @@ module nocdyn_excitation_lines
   type, public :: listed_harmonic_t
     type(harmonic_t) :: harmonic
     integer :: lister = 0               !! the element
-    integer :: number = 0               !! among those that it lists
   end type listed_harmonic_t
 
   !> Work space of one thread, and the last solution.
@@ -54,7 +53,7 @@ module nocdyn_excitation_lines
 
   real(wp), parameter :: same = 1.0e-9_wp   ! relative difference of equal frequencies
 
-  public :: frequency_of, list_machine_harmonics, list_sources, set_sources
+  public :: list_machine_harmonics, list_sources, set_sources
 
 contains
 
@@ -120,7 +119,7 @@ contains
           end if
           do i = 1, size(of_element)
             if (is_shaken) of_element(i)%frequency = state%speed
-            list(n + i) = listed_harmonic_t(of_element(i), bank%first + e - 1, i)
+            list(n + i) = listed_harmonic_t(of_element(i), bank%first + e - 1)
           end do
           n = n + size(of_element)
         end do
@@ -144,20 +143,6 @@ contains
       end associate
     end do
   end subroutine set_sources
-
-  !> The frequency of a harmonic that is known from another state or machine [rad/s].
-  real(wp) function frequency_of(known, machine, state, shaker) result(frequency)
-    type(listed_harmonic_t), intent(in) :: known
-    type(machine_t), intent(in) :: machine      !! with its periodic torques
-    type(held_state_t), intent(in) :: state
-    integer, intent(in) :: shaker               !! as of `list_sources`
-    type(listed_harmonic_t), allocatable :: list(:)
-    type(source_t) :: source
-
-    call list_machine_harmonics(machine, state, list, shaker, known%lister)
-    call set_source(list(known%number)%harmonic, state, source)
-    frequency = source%frequency
-  end function frequency_of
 
   !> A harmonic with phi = phi_0 + omega t, as the real part of moment exp(i Omega t), Omega > 0.
   pure subroutine set_source(harmonic, state, source)

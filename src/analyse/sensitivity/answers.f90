@@ -40,9 +40,9 @@ module nocdyn_answers
   end type answers_t
 
   !> Answers among others.
-  type, public :: group_t
+  type, public :: answers_group_t
     class(answers_t), pointer :: answers => null()
-  end type group_t
+  end type answers_group_t
 
   abstract interface
 
@@ -95,13 +95,13 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(in) :: machine   !! of it
     type(varied_key_t), intent(in) :: keys(:)
-    type(group_t), intent(in) :: groups(:)
+    type(answers_group_t), intent(in) :: groups(:)
     type(string_t), allocatable, intent(inout) :: notes(:)
     type(error_t), allocatable, intent(out) :: error   !! of some answers all numbers are such ones
-    type :: slopes_t
+    type :: slopes_by_keys_t
       real(wp), allocatable :: by(:, :)   ! [functionals, keys]
-    end type slopes_t
-    type(slopes_t) :: slopes(size(groups))
+    end type slopes_by_keys_t
+    type(slopes_by_keys_t) :: slopes(size(groups))
     type(error_t), allocatable :: own
     type(number_change_t) :: number
     type(string_t), allocatable :: failed(:), rough(:)

@@ -149,7 +149,7 @@ contains
 
   subroutine assemble(self, set, error)
     class(number_change_t), intent(inout) :: self
-    integer, intent(in) :: set   !! 1: without, 2: with locked joints as rows
+    integer, intent(in) :: set   !! without (1) or with (2) locked joints as rows
     type(error_t), allocatable, intent(out) :: error
     integer :: p
 

@@ -2,7 +2,7 @@
 module nocdyn_response_functionals
   use nocdyn_assembly, only: assemble_steady_machine
   use nocdyn_errors, only: error_t, exit_failed, raise
-  use nocdyn_excitation_lines, only: frequency_of, list_sources, listed_harmonic_t, set_sources, source_t
+  use nocdyn_excitation_lines, only: list_machine_harmonics, listed_harmonic_t, set_sources, source_t
   use nocdyn_frozen_motions, only: frame_t, frozen_motion_t, new_view, view_t
   use nocdyn_frozen_states, only: displacement_t, frozen_state_t, mean_laws_t
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t, new_held_speeds
@@ -43,7 +43,7 @@ module nocdyn_response_functionals
     type(listed_harmonic_t), allocatable :: harmonics(:)
     real(wp) :: speed = 0.0_wp             !! [rad/s]
     real(wp) :: slope = 0.0_wp             !! over the speed, at constant numbers
-    integer :: critical = 0                !! 0: the speed stays
+    integer :: critical = 0                !! with which it moves; 0: the speed stays
     integer :: answer = 0
   end type half_range_answer_t
 
@@ -91,10 +91,10 @@ contains
     values(:2) = [real(form, wp), aimag(form)]
     if (keeps_harmonics) then
       call set_sources([one%source], state, sources)
-      values(3) = sources(1)%frequency
     else
-      values(3) = frequency_of(one%source, machine, state, self%analysis%response%shaker)
+      call list_again([one%source], machine, state, self%analysis%response%shaker, sources, one%source%lister)
     end if
+    values(3) = sources(1)%frequency
   end subroutine evaluate_critical
 
   subroutine differentiate_near(self, number, slopes, is_done, error)
@@ -179,11 +179,11 @@ contains
     type(changed_machine_t), intent(inout) :: near(near_points)
     real(wp), intent(inout) :: slopes(:)   !! all are 0 before, [half ranges]
     type(error_t), allocatable, intent(out) :: error
-    type :: forms_t
+    type :: machine_forms_t
       type(moment_form_t), allocatable :: all(:)
-    end type forms_t
+    end type machine_forms_t
     type(displacement_t) :: displacement
-    type(forms_t) :: forms(near_points)
+    type(machine_forms_t) :: forms(near_points)
     type(held_state_t) :: state
     type(view_t) :: view
     integer :: i, p
@@ -231,10 +231,48 @@ contains
     if (keeps_harmonics) then
       call set_sources(half%harmonics, state, sources)
     else
-      call list_sources(machine, state, sources, self%analysis%response%shaker)
+      call list_again(half%harmonics, machine, state, self%analysis%response%shaker, sources)
     end if
     value = half%lines%changed(self%analysis%response, self%frame, view, machine, state, sources, forms(half%lines%form))
   end subroutine evaluate_half
+
+  !> Known harmonics as sources in a changed machine or state. Those that are rounding come and go.
+  subroutine list_again(known, machine, state, shaker, sources, only)
+    type(listed_harmonic_t), intent(in) :: known(:)
+    type(machine_t), intent(in) :: machine
+    type(held_state_t), intent(in) :: state
+    integer, intent(in) :: shaker
+    type(source_t), allocatable, intent(out) :: sources(:)
+    integer, intent(in), optional :: only   !! as of `list_machine_harmonics`
+    type(listed_harmonic_t), allocatable :: list(:)
+    type(listed_harmonic_t) :: again(size(known))
+    integer :: i, k, next
+
+    call list_machine_harmonics(machine, state, list, shaker, only)
+    again = known
+    next = 1
+    do i = 1, size(known)
+      again(i)%harmonic%amplitude = 0.0_wp
+      do k = next, size(list)
+        if (.not. is_same(list(k), known(i))) cycle
+        again(i) = list(k)
+        next = k + 1
+        exit
+      end do
+    end do
+    call set_sources(again, state, sources)
+  end subroutine list_again
+
+  !> Whether two harmonics are one, up to small changes.
+  elemental logical function is_same(a, b)
+    type(listed_harmonic_t), intent(in) :: a, b
+    real(wp), parameter :: small = 0.02_wp   ! relative
+
+    is_same = a%lister == b%lister .and. a%harmonic%element == b%harmonic%element .and. a%harmonic%body == b%harmonic%body &
+              .and. (a%harmonic%is_twist .eqv. b%harmonic%is_twist) &
+              .and. abs(a%harmonic%order - b%harmonic%order) <= small * abs(b%harmonic%order) &
+              .and. abs(a%harmonic%frequency - b%harmonic%frequency) <= small * abs(b%harmonic%frequency)
+  end function is_same
 
   !> Whether the elements list the same harmonics: no speed of theirs is another one.
   pure logical function keeps_harmonics(number, near, before, state)

@@ -1,7 +1,7 @@
 !> Derivatives of what analyses answer by the numbers of a machine, as an analysis: sensitivity.csv and sensitivity.json.
 module nocdyn_sensitivity_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
-  use nocdyn_answers, only: answer_t, differentiate, group_t
+  use nocdyn_answers, only: answer_t, differentiate, answers_group_t
   use nocdyn_errors, only: error_t, exit_failed, raise
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -35,7 +35,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(mode_answers_t), target :: modes
     type(response_answers_t), target :: response
-    type(group_t) :: groups(2)
+    type(answers_group_t) :: groups(2)
     integer :: count
     character(len=:), allocatable :: at
 

@@ -65,7 +65,7 @@ contains
         do k = 1, size(group%values)
           associate (rule => key_rules(first_key(group%rule) + k - 1), value => group%values(k))
             if (rule%value_type /= a_number .or. .not. value%is_given .or. .not. allocated(value%numbers)) cycle
-            if (index(rule%name, 'order') > 0) cycle   ! which lines there are
+            if (index(rule%name, 'order') > 0 .or. rule%name == 'harmonics_up_to') cycle   ! which lines there are
             path = group%kind // '.' // group%name // '.' // trim(rule%name)
             if (size(value%numbers) > most_of_a_list .or. rule%ascends) then
               call append(long, path)
