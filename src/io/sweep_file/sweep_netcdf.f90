@@ -123,8 +123,8 @@ contains
     call put_text(file, file%axis, 'role', 'axis')
   end subroutine define_axis
 
-  !> Defines a variable for each quantity, and for each curve. Its name is the label as far as NetCDF allows; the attribute `label`
-  !> has all of it.
+  !> Defines a variable for each quantity, and for each curve. Its name is the label as far as NetCDF allows; the attribute
+  !> `label` has all of it.
   subroutine define_quantities(file, quantities, role, variables)
     type(sweep_file_t), intent(inout) :: file
     type(stored_quantity_t), intent(in) :: quantities(:)

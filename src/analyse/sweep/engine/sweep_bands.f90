@@ -16,8 +16,8 @@ module nocdyn_sweep_bands
   public :: new_bands
 
   character(len=*), parameter, public :: bands_file = 'bands.csv'
-  character(len=*), parameter :: statistic_words(*) = [character(len=8) :: 'nominal', 'min', 'p5', 'p25', 'median', 'p75', 'p95', &
-                                                       'max', 'variants', 'limit']
+  character(len=*), parameter :: statistic_words(*) = [character(len=8) :: 'nominal', 'min', 'p5', 'p25', 'median', 'p75', &
+                                                       'p95', 'max', 'variants', 'limit']
 
   !> A column of the table.
   type :: band_column_t

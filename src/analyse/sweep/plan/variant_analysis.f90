@@ -136,8 +136,8 @@ contains
       if (results(i)%statistic /= analysis_mode_curve) cycle
       associate (modes => campbell%modes, mode => results(i)%mode)
         if (mode > modes%modes) then
-          call raise(error, exit_failed, 'mode ' // to_text(mode) // ' is recorded, but the number of oscillating modes over ' // &
-                     'the speed is ' // to_text(modes%modes))
+          call raise(error, exit_failed, 'mode ' // to_text(mode) // ' is recorded, but the number of oscillating modes ' // &
+                     'over the speed is ' // to_text(modes%modes))
           return
         end if
         values(i) = ieee_value(0.0_wp, ieee_quiet_nan)
