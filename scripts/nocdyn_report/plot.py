@@ -78,7 +78,8 @@ def places_of(kind: str, folder: Path) -> list[Path]:
     """Where the results of a kind are: in a folder, else in those of its load cases."""
     if any(folder.glob(KINDS[kind][1])):
         return [folder]
-    return [case.folder for case in ResultFiles(folder).there(kind)] if kind in MAIN_FILES else []
+    cases = ResultFiles(folder).there(kind) if kind in MAIN_FILES else []
+    return [case.folder for case in cases if case.name]  # a sweep has a summary.json too
 
 
 def _draw_each(kind: str, words: Sequence[str]) -> int:

@@ -108,6 +108,8 @@ def test_the_list_has_every_shipped_machine_with_oscillations():
     # hysteretic damping: test_example_load_cases.py
     others |= {f"input/examples/{name}/{name}.nml" for name in ("generator_set", "vfd_compressor")}
     others |= {"docs/tutorial/pump_set.nml"}  # hysteretic damping: test_sensitivity.py
+    others |= {"docs/tutorial/damper.nml"}  # against closed forms: test_optimise.py
+    others |= {"input/sweeps/coupling_tolerance.nml"}  # hysteretic damping: test_sweep_curves.py
     others |= {"docs/tutorial/hardening.nml"}  # jumps: test_orbit.py
     others |= {"docs/tutorial/signs.nml"}  # its compressor has a table of torques: test_engines.py
     assert shaken - others == set(MACHINES)

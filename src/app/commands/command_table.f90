@@ -212,9 +212,9 @@ contains
       'names, else one beside nocdyn, else python3 in the PATH.'
 
     call add_command(commands, 'plot', '[KIND] DIR', passed_on, 'draw results', &
-      'Draws the results of run, modes, campbell, response, orbit or sweep in DIR, to DIR/figures.' // nl // nl // &
+      'Draws the results in DIR, to DIR/figures.' // nl // nl // &
       '  nocdyn plot DIR           all that DIR holds' // nl // &
-      '  nocdyn plot KIND DIR      results of one KIND: run, modes, campbell, response, orbit, transit, sweep' // nl // &
+      '  nocdyn plot KIND DIR      of one KIND: run, modes, campbell, response, orbit, transit, fit, sweep' // nl // &
       '  nocdyn plot KIND --help   the options of a KIND' // nl // &
       '  nocdyn plot paper         compute the two cases of the paper and draw its figures 2 to 5' // on_python, python_command)
     call add_command(commands, 'report', 'FILE', passed_on, 'a report on a machine, HTML and PDF', &
