@@ -126,6 +126,14 @@ def test_random_sweep_of_two_numbers_with_failures_is_drawn(tmp_path, monkeypatc
     assert "refused or failed" in text_of(folder, "map")
 
 
+def test_a_sweep_is_drawn_without_its_kind_being_named(tmp_path, capsys):
+    numbers = random_numbers(200, 2)
+    folder = write_sweep(tmp_path, "random", {LOAD: numbers[0], CUBIC: numbers[1]}, {MOMENT: numbers[0]})
+    (folder / "summary.json").write_text("{}")  # as of a run
+    assert importlib.import_module("nocdyn_report.plot").main([str(folder), "--format", "png"]) == 0
+    assert "histograms" in capsys.readouterr().out
+
+
 def test_percentiles_are_those_of_the_printed_summary(tmp_path):
     order = np.random.default_rng(1).permutation(101)
     folder = write_sweep(tmp_path, "random", {LOAD: order}, {MOMENT: order + 1.0})
