@@ -54,7 +54,7 @@ contains
   !> Writes cells after others; those of numbers that are not known are empty.
   subroutine put_known(file, values)
     type(output_file_t), intent(inout) :: file
-    real(wp), intent(in) :: values(:)   !! NaN: not known
+    real(wp), intent(in) :: values(:)   !! not a number where none is known
     integer :: first, last
 
     first = 1

@@ -16,7 +16,7 @@ module nocdyn_log_file
   private
 
   character(len=*), parameter :: line_begin = 'nocdyn ', line_end = ' journal   ' // new_line('a')
-  integer(int32), parameter :: format_version = 2, byte_order = int(z'01020304', int32)
+  integer(int32), parameter :: format_version = 3, byte_order = int(z'01020304', int32)
   integer, parameter :: line_bytes = len(line_begin) + 5 + len(line_end), start_bytes = line_bytes + 2 * integer_bytes
   integer, parameter :: initial_buffer = 65536
   real, parameter :: flush_interval = 5.0   ! [s]
