@@ -116,6 +116,7 @@ OPTIONS = {
     "--at": "rest",
     "--modes": "1",
     "--range_hz": "1,2",
+    "--peaks": None,
     "--holzer": None,
     "--kind": "ship",
     "--threads": "1",

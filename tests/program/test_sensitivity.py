@@ -415,3 +415,132 @@ def test_teeth_that_lose_power_are_refused(nocdyn):
     assert outcome.returncode == 1
     assert "the teeth of this machine lose power" in outcome.stderr
     assert not (nocdyn.folder / "out/sensitivity.json").exists()
+
+
+STRUCK = """\
+&body name = 'a' inertia = 2.0 speed = 3.0 /
+&body name = 'b' inertia = 1.0 speed = 2.0 /
+&body name = 'c' inertia = 3.0 speed = 1.0 /
+&coupling name = 'k' bodies = 'a', 'b' stiffness = 2e4 damping = 4.0 /
+&coupling name = 'q' bodies = 'b', 'c' stiffness = 3e4 damping = 6.0 /
+&load name = 'l' body = 'c' viscous = 1.5 /
+&excitation name = 'e' body = 'a' kind = 'step' amplitude = 200 time = 0.05 /
+&limit coupling = 'k' moment = 500 /
+&limit coupling = 'q' moment = 500 /
+&limit coupling = 'q' quantity = 'total_moment' largest = 400 /
+&run t_end = 0.3 /
+"""
+
+
+def struck_peak(numbers, coupling, near):
+    """The extreme of a moment next to a time after the step, by the exponential of the matrix of the machine."""
+    inertia = [numbers[f"body.{name}.inertia"] for name in "abc"]
+    matrix = mpmath.zeros(7)  # angles, speeds, and the torque that is switched on
+    rows = {}
+    for name, first in (("k", 0), ("q", 1)):
+        stiffness, damping = numbers[f"coupling.{name}.stiffness"], numbers[f"coupling.{name}.damping"]
+        row = mpmath.zeros(1, 7)
+        row[first], row[first + 1], row[first + 3], row[first + 4] = stiffness, -stiffness, damping, -damping
+        rows[name] = row
+        for column in range(7):
+            matrix[3 + first, column] -= row[column] / inertia[first]
+            matrix[4 + first, column] += row[column] / inertia[first + 1]
+    for i in range(3):
+        matrix[i, 3 + i] = 1
+    matrix[5, 5] -= numbers["load.l.viscous"] / inertia[2]
+    matrix[3, 6] = numbers["excitation.e.amplitude"] / inertia[0]
+    switched = numbers["excitation.e.time"]
+    state = mpmath.matrix([0, 0, 0, *(numbers[f"body.{name}.speed"] for name in "abc"), 0])
+    state = mpmath.expm(matrix * switched) * state
+    state[6] = 1
+
+    def state_at(time):
+        return mpmath.expm(matrix * (time - switched)) * state
+
+    time = mpmath.findroot(lambda t: (rows[coupling] * matrix * state_at(t))[0], (near, near + 1e-5))
+    return (rows[coupling] * state_at(time))[0], time
+
+
+def test_derivatives_of_peaks_after_a_step_are_those_of_the_closed_form(nocdyn):
+    """Also by the time of the step, at which the derivatives jump, and by the speeds at the start."""
+    answers, report = sensitivity(nocdyn, STRUCK, "--at", "rest", "--peaks")
+    peaks = [one for one in answers if one["kind"] == "peak of a run"]
+    assert [one["of"].split(" ")[0] for one in peaks] == ["total_moment_k", "total_moment_q"]
+    numbers = {number["path"]: number["value"] for number in report["numbers"]}
+    assert len(numbers) == 13
+    with mpmath.workdps(DIGITS):
+        for one in peaks:
+            near, coupling = float(one["of"].split(" ")[2]), one["of"][13]
+            exact = {path: mpmath.mpf(value) for path, value in numbers.items()}
+            value, time = struck_peak(exact, coupling, near)
+            assert abs(time - near) < 1e-6
+            assert time > exact["excitation.e.time"]
+            assert one["value"] == pytest.approx(abs(float(value)), rel=1e-9)
+            for path in numbers:
+                ends = [struck_peak(exact | {path: exact[path] * (1 + sign * STEP)}, coupling, time)[0] for sign in (1, -1)]
+                change = float((ends[0] - ends[1]) / (2 * STEP)) * (1 if value > 0 else -1)  # of the whole number
+                assert abs(one["by"][path] * numbers[path] - change) <= 1e-7 * one["value"], (one["of"], path, change)
+
+
+LOOSE = """\
+&body name = 'a' inertia = 2.0 speed = 30.0 /
+&body name = 'b' inertia = 1.0 speed = 30.0 /
+&body name = 'c' inertia = 3.0 speed = -15.0 /
+&body name = 'd' inertia = 1.2 speed = -15.0 /
+&coupling name = 'bent' bodies = 'a', 'b' stiffness = 2e4 cubic_stiffness = 4e8 damping = 4.0 /
+&gear name = 'g' bodies = 'b', 'c' radii = 0.1, 0.2 /
+&coupling name = 'loose' bodies = 'c', 'd' stiffness = 3e4 damping = 6.0 gap = 0.004 /
+&motor name = 'm' body = 'a' a = 90 b = 1 c = 0 /
+&load name = 'l' body = 'd' quadratic = 0.3 /
+&excitation name = 'e' body = 'a' kind = 'step' amplitude = 200 time = 0.05 /
+&excitation name = 'o' body = 'a' kind = 'orders' orders = 2 amplitudes = 50 phases_deg = 20 /
+&limit coupling = 'bent' moment = 500 /
+&limit coupling = 'loose' moment = 500 /
+&output extremes_from = 0.06 /
+&run t_end = 0.4 rtol = 1e-12 atol = 1e-15 start = 'projected' /
+"""
+
+
+def run_peaks(nocdyn, text, *words):
+    nocdyn.done(text, *words)
+    return {line["quantity"]: line["value"] for line in nocdyn.summary("out")["verdict"]["lines"] if line["analysis"] == "run"}
+
+
+def test_derivatives_of_peaks_of_a_curved_machine_are_those_of_runs(nocdyn):
+    """A cubic law, a gap whose edges are crossed, a ratio, a step."""
+    answers, report = sensitivity(nocdyn, LOOSE, "--peaks")
+    peaks = [one for one in answers if one["kind"] == "peak of a run"]
+    assert len(peaks) == 2
+    values = {number["path"]: number["value"] for number in report["numbers"]}
+    assert {"coupling.loose.gap", "excitation.e.time", "gear.g.radii(2)", "body.a.speed"} <= set(values)
+    for path, value in values.items():
+        step = 1e-4 * value
+        ends = {k: run_peaks(nocdyn, LOOSE, "--set", f"{path}={value + k * step!r}") for k in (-2, -1, 1, 2)}
+        for one in peaks:
+            a, b, c, d = (ends[k][one["of"].split(" ")[0]] for k in (-2, -1, 1, 2))
+            change = (a - 8 * b + 8 * c - d) / (12 * 1e-4)
+            assert abs(one["by"][path] * value - change) <= 1e-6 * one["value"], (one["of"], path, change)
+
+
+def test_a_peak_at_an_end_is_said(nocdyn):
+    answers, report = sensitivity(nocdyn, LOOSE, "--peaks", "--set", "run.t_end=0.0602")
+    assert sum("is at an end of the time in which it is sought" in note for note in report["notes"]) >= 1
+    peak = next(one for one in answers if one["kind"] == "peak of a run")
+    assert max(map(abs, peak["derivative"])) > 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "message"),
+    [
+        ("&limit coupling = 'k' moment = 500 /", "&clutch name = 'x' bodies = 'c', 'ground' capacity = 5 /", 1, "joints that"),
+        ("moment = 500", "vibratory_moment = 500", 2, "there is no &limit of a run; required: one with moment, force or largest"),
+    ],
+)
+def test_peaks_that_have_no_derivatives_are_refused(nocdyn, old, new, code, message):
+    text = STRUCK.replace("&limit coupling = 'q' quantity = 'total_moment' largest = 400 /", "")
+    assert old in text
+    file = nocdyn.write("machine.nml", text.replace(old, new))
+    outcome = nocdyn("sensitivity", file, "--at", "rest", "--peaks", "--out", "out")
+    assert outcome.returncode == code, outcome.stderr
+    assert message in outcome.stderr
+    assert not (nocdyn.folder / "out/sensitivity.json").exists()

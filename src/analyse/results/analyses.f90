@@ -21,6 +21,7 @@ module nocdyn_analyses
     logical :: has_range = .false.            !! whether modes in a range are wanted
     real(wp) :: range_hz(2) = 0.0_wp          !! their frequencies, from and to [Hz]
     logical :: has_holzer = .false.           !! whether tables of Holzer are wanted
+    logical :: has_peaks = .false.            !! whether peaks of a run are wanted too
     logical :: has_code = .false.             !! whether a program in C is wanted instead of matrices
     logical :: writes_files = .false.         !! whether files are written
     logical :: compares = .true.              !! whether measurements are compared; variants of a sweep are not

@@ -8,6 +8,7 @@ module nocdyn_sensitivity_results
   use nocdyn_machine, only: machine_t
   use nocdyn_mode_answers, only: mode_answers_t, new_mode_answers
   use nocdyn_output_file, only: output_file_t
+  use nocdyn_peak_answers, only: find_peak_answers
   use nocdyn_response_answers, only: new_response_answers, response_answers_t
   use nocdyn_sensitivity_report, only: put_sensitivity, sensitivity_csv, sensitivity_t, sensitivity_text
   use nocdyn_text, only: append, quoted, string_t
@@ -36,6 +37,7 @@ contains
     type(mode_answers_t), target :: modes
     type(response_answers_t), target :: response
     type(answers_group_t) :: groups(2)
+    type(answer_t), allocatable :: peaks(:)
     integer :: count
     character(len=:), allocatable :: at
 
@@ -66,6 +68,11 @@ contains
     if (allocated(error)) then
       error%message = input%shown_case() // ': ' // error%message
       return
+    end if
+    if (options%has_peaks) then
+      call find_peak_answers(input, self%found%keys, peaks, self%found%notes, error)
+      if (allocated(error)) return
+      call add_answers(peaks, self%found%answers)
     end if
     if (count == 2) call add_answers(response%answers, self%found%answers)
     call add_answers(modes%answers, self%found%answers)

@@ -25,6 +25,7 @@ module nocdyn_arguments
     option_t('--modes', value='NUMBER'), &
     option_t('--starts', value='NUMBER'), &
     option_t('--range_hz', value='LOW,HIGH'), &
+    option_t('--peaks', may_repeat=.true.), &
     option_t('--kind', value='KIND'), &
     option_t('--holzer', may_repeat=.true.), &
     option_t('--code', may_repeat=.true.), &

@@ -279,6 +279,7 @@ contains
     options%has_range = arguments%is_given('--range_hz')
     options%range_hz = arguments%range_hz
     options%has_code = arguments%is_given('--code')
+    options%has_peaks = arguments%is_given('--peaks')
     options%has_holzer = arguments%is_given('--holzer')
     options%writes_files = job%folder /= ''
     options%folder = result_folder(arguments, input)

@@ -121,7 +121,7 @@ contains
       '                     machine with more than 600 degrees of freedom 100' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies at the first speed [Hz]' // nl // &
       '  --quiet            print nothing but errors', analysis_command)
-    call add_command(commands, 'sensitivity', 'FILE...', '--out --set --case --variant --at --modes --range_hz', &
+    call add_command(commands, 'sensitivity', 'FILE...', '--out --set --case --variant --at --modes --range_hz --peaks', &
       'derivatives of frequencies, critical speeds and half ranges by every number', &
       'Differentiates what modes and response answer by every number of the machine: frequencies and damping, with' // nl // &
       '&response also critical speeds, their margins and the half ranges there. Prints for each answer the numbers' // nl // &
@@ -129,6 +129,7 @@ contains
       '  --at equilibrium   modes about the steady state (default), or at rest, as of nocdyn modes' // nl // &
       '  --modes NUMBER     only so many modes, of the lowest frequencies' // nl // &
       '  --range_hz LOW,HIGH  only the modes in this range of frequencies [Hz]' // nl // &
+      '  --peaks            also the peaks of a run: the largest magnitudes that a &limit judges' // nl // &
       '  --set PATH=VALUE   override a key' // nl // &
       '  --out DIR          write sensitivity.csv and sensitivity.json to DIR' // nl // &
       case_help, analysis_command)
