@@ -15,6 +15,7 @@ module nocdyn_step_pieces
 
   integer, parameter :: most_halvings = 12
   real(wp), parameter :: wave_part = 0.5_wp       ! of a wave in a piece, times the degree of the polynomials [rad]
+  real(wp), parameter :: most_pieces = 1.0e3_wp   ! of a step, before they are halved
   real(wp), parameter :: tolerance = 2.0e-5_wp    ! of the last terms, relative to the range of the function so far
   real(wp), parameter :: least_range = 1.0e-3_wp  ! that counts, relative to the largest absolute value so far
   real(wp), parameter :: rounding = 1.0e-6_wp     ! a range that does not count, relative to the scale of the functions
@@ -104,12 +105,13 @@ contains
     call start_piece(self)
   end subroutine start_step
 
-  !> The number of pieces of a step, or of a part of one, before they are halved.
+  !> The number of pieces of a step, or of a part of one, before they are halved. A step over many more waves has found them
+  !> smaller than its tolerance, as those of a speed that runs away to infinity are.
   pure integer function count_pieces(t_start, t_end, fastest, degree) result(pieces)
     real(wp), intent(in) :: t_start, t_end, fastest   !! as in `start_step`
     integer, intent(in) :: degree
 
-    pieces = ceiling(max(1.0_wp, min(0.5_wp * huge(1), (t_end - t_start) * fastest / (wave_part * degree))))
+    pieces = ceiling(max(1.0_wp, min(most_pieces, (t_end - t_start) * fastest / (wave_part * degree))))
   end function count_pieces
 
   pure subroutine start_piece(self)
