@@ -170,7 +170,7 @@ contains
   subroutine find_weights(change, weight, weight_here)
     real(wp), intent(in) :: change(:)    !! at which the function is evaluated, none of them 0
     real(wp), intent(out) :: weight(:), weight_here
-    real(wp) :: powers(size(change), size(change)), scale
+    real(wp) :: powers(size(change), size(change)), scale, solution(size(change))
     integer :: k, pivots(size(change))
     logical :: is_singular
 
@@ -178,10 +178,11 @@ contains
     do k = 1, size(change)
       powers(k, :) = (change / scale)**k
     end do
-    weight = 0.0_wp
-    weight(1) = 1.0_wp / scale
+    solution = 0.0_wp
+    solution(1) = 1.0_wp / scale
     call lu_factor(powers, pivots, is_singular)
-    call lu_solve(powers, pivots, weight)
+    call lu_solve(powers, pivots, solution)
+    weight = solution
     weight_here = -sum(weight)
     if (abs(sum(change)) <= epsilon(scale) * scale) weight_here = 0.0_wp
   end subroutine find_weights

@@ -206,7 +206,7 @@ contains
     type(analysis_result_t) :: one
     type(string_t), allocatable :: words(:)
     character(len=:), allocatable :: owner
-    integer :: before, i, k
+    integer :: before, i, k, points   ! the last of a curve, 0 without a response
 
     if (input%groups(record)%has_value('path')) then
       call self%add_paths(input, record, others, results, diagnostics)
@@ -216,6 +216,8 @@ contains
       call self%add_orbit(input, record, others, results, diagnostics)
       return
     end if
+    points = 0
+    if (allocated(self%settings%speeds)) points = size(self%settings%speeds)
     owner = 'mode'
     if (input%groups(record)%has_value('response')) owner = 'response'
     before = diagnostics%count
@@ -243,12 +245,12 @@ contains
         call self%check_statistic(input, record, k, diagnostics)
         call make_response_result(self, input, record, k, one)
       end if
-      if (one%is_curve() .and. size(self%settings%speeds) > most_points) then
+      if (one%is_curve() .and. points > most_points) then
         call input%report(record, 'statistic', "statistic = 'curve' keeps a number at each of the " // &
-                          to_text(size(self%settings%speeds)) // ' ' // self%settings%axis%plural() // ' of &response; ' // &
+                          to_text(points) // ' ' // self%settings%axis%plural() // ' of &response; ' // &
                           'allowed: at most ' // to_text(most_points), diagnostics)
       else
-        call append_new(input, record, 'statistic', others, one, results, diagnostics, size(self%settings%speeds))
+        call append_new(input, record, 'statistic', others, one, results, diagnostics, points)
       end if
     end do
   end subroutine add_results
