@@ -54,6 +54,7 @@ contains
     type(machine_t), intent(in) :: machine   !! of the input
     character(len=:), allocatable :: name
     integer :: b
+    logical :: is_inertia
 
     self%key = key
     self%is_known = .false.
@@ -64,7 +65,9 @@ contains
       self%is_of_elements = (group%kind == 'coupling' .or. group%kind == 'load') .and. &
                             any(name == [character(len=15) :: 'stiffness', 'cubic_stiffness', 'damping', 'viscous', 'quadratic'])
       self%keeps_harmonics = any(group%kind == [character(len=8) :: 'coupling', 'shaft', 'damper'])
-      if (group%kind == 'body' .and. name == 'inertia' .and. .not. group%number('entrained', absent=0.0_wp) > 0) then
+      is_inertia = group%kind == 'body' .and. name == 'inertia'
+      if (is_inertia) is_inertia = .not. group%number('entrained', absent=0.0_wp) > 0
+      if (is_inertia) then
         self%body = findloc(self%input%groups_named('body'), key%target%group, dim=1)
         do b = 1, size(machine%banks)
           associate (bank => machine%banks(b)%bank)
