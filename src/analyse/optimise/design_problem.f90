@@ -139,11 +139,8 @@ contains
 
     call list_signals(plan%machine, signals)
     allocate (groups, source=input%groups_named('limit'))
-    associate (run => input%groups(input%position('run')))
-      from = run%number('t_start')
-    end associate
-    associate (outputs => input%groups_named('output'))
-      if (size(outputs) > 0) from = input%groups(outputs(1))%number('extremes_from', absent=from)
+    associate (run => input%groups(input%position('run')), output => input%groups(input%position('output')))
+      from = output%number('extremes_from', absent=run%number('t_start'))
     end associate
     do g = 1, size(groups)
       do k = 1, size(peak_keys)

@@ -8,11 +8,11 @@ module nocdyn_orbit_guess
   use nocdyn_integration_settings, only: integration_settings_t
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
-  use nocdyn_observer, only: observer_t
   use nocdyn_orbit_series, only: find_series
   use nocdyn_orbit_settings, only: orbit_settings_t
   use nocdyn_periodic_machine, only: orbit_t, periodic_machine_t
   use nocdyn_sampled_machine, only: with_start
+  use nocdyn_sampler, only: sampler, sampler_t
   use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
   use nocdyn_targets, only: set_targets
   implicit none (type, external)
@@ -22,14 +22,6 @@ module nocdyn_orbit_guess
 
   real(wp), parameter :: turn = 2.0_wp * acos(-1.0_wp)   ! [rad]
   integer, parameter, public :: guess_samples = 64   !! of a period from which series are found
-
-  !> Keeps the states of all times that are asked for.
-  type, extends(observer_t) :: kept_states_t
-    real(wp), allocatable :: y(:, :)   !! [states, times]
-    integer :: count = 0
-  contains
-    procedure :: on_output
-  end type kept_states_t
 
 contains
 
@@ -130,31 +122,21 @@ contains
     real(wp), contiguous, intent(inout) :: y(:, :)    !! state at the first time, then at the last one
     real(wp), allocatable, intent(out) :: states(:, :)
     type(error_t), allocatable, intent(out) :: error
-    type(kept_states_t) :: observer
+    type(sampler_t) :: observer
     type(integration_settings_t) :: settings
     type(solver_status_t) :: status
 
     settings%rtol = 1.0e-8_wp
     settings%atol = 1.0e-10_wp
     settings%max_steps = 100000000
-    allocate (observer%y(size(y, 2), size(times)), source=0.0_wp)
+    observer = sampler(1, size(y, 2), size(times))
     call integrate(formulation, settings, times, y, observer, status, error)
     if (allocated(error)) return
     if (status%code(1) /= integration_done) then
       call raise(error, exit_failed, 'the run that should settle: ' // &
                  failure_message(status, 1, formulation, settings%rtol, settings%atol))
     end if
-    call move_alloc(observer%y, states)
+    allocate (states, source=observer%y(:, :, 1))
   end subroutine advance
-
-  subroutine on_output(self, lane, t, y)
-    class(kept_states_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
-
-    self%count = self%count + 1
-    self%y(:, self%count) = y
-  end subroutine on_output
 
 end module nocdyn_orbit_guess

@@ -14,8 +14,8 @@ module nocdyn_peak_answers
   use nocdyn_limit_groups, only: limited_signal
   use nocdyn_machine, only: machine_t
   use nocdyn_measured_runs, only: merged_times
-  use nocdyn_observer, only: observer_t
   use nocdyn_run_verdict, only: peak_keys
+  use nocdyn_sampler, only: sampler, sampler_t
   use nocdyn_signal_values, only: new_signal_values, signal_values_t
   use nocdyn_signals, only: list_signals, signal_t
   use nocdyn_solver_status, only: failure_message, integration_done, solver_status_t
@@ -40,14 +40,6 @@ module nocdyn_peak_answers
     real(wp) :: value = 0.0_wp   !! with its sign
     real(wp) :: time = 0.0_wp    !! [s]
   end type run_peak_t
-
-  !> Keeps the states at output times.
-  type, extends(observer_t) :: state_observer_t
-    real(wp), allocatable :: y(:, :)   !! [states, times]
-    integer :: count = 0
-  contains
-    procedure :: on_output
-  end type state_observer_t
 
 contains
 
@@ -286,7 +278,7 @@ contains
     real(wp), allocatable, intent(out) :: slopes(:, :)   !! [peaks, numbers]
     type(error_t), allocatable, intent(out) :: error
     type(solver_status_t) :: status
-    type(state_observer_t) :: observer
+    type(sampler_t) :: observer
     real(wp), allocatable :: times(:), y(:, :)
     integer :: i, j
 
@@ -296,8 +288,8 @@ contains
       times = merged_times(times, [peaks(i)%time])
     end do
     allocate (y, source=motion%start())
-    allocate (observer%y(size(y), size(times)), source=0.0_wp)
-    observer%y(:, 1) = y(1, :)
+    observer = sampler(1, size(y), size(times))
+    observer%y(:, 1, 1) = y(1, :)
     if (size(times) > 1) then
       call integrate(motion, settings, times, y, observer, status, error)
       if (allocated(error)) return
@@ -308,7 +300,7 @@ contains
     end if
     do j = 1, motion%numbers
       do i = 1, size(peaks)
-        call differentiate_signal(motion, j, peaks(i), observer%y(:, findloc(times, peaks(i)%time, dim=1)), slopes(i, j))
+        call differentiate_signal(motion, j, peaks(i), observer%y(:, findloc(times, peaks(i)%time, dim=1), 1), slopes(i, j))
       end do
     end do
   end subroutine differentiate_peaks
@@ -351,15 +343,5 @@ contains
     call values%fill_row(1, peak%time, state, row)
     value = row(1)
   end function value_at
-
-  subroutine on_output(self, lane, t, y)
-    class(state_observer_t), intent(inout) :: self
-    integer, intent(in) :: lane
-    real(wp), intent(in) :: t
-    real(wp), contiguous, intent(in) :: y(:)
-
-    self%count = self%count + 1
-    self%y(:, self%count) = y
-  end subroutine on_output
 
 end module nocdyn_peak_answers

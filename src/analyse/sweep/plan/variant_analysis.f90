@@ -41,8 +41,6 @@ contains
     type(analysis_result_t), intent(in) :: results(:)   !! paths are left out
     real(wp), intent(out) :: values(:)               !! [results]
     type(error_t), allocatable, intent(out) :: error
-    class(analysis_t), allocatable :: command
-    type(machine_t) :: machine
     type(response_analysis_t) :: analysis
     type(mode_t), allocatable :: modes(:)
     logical :: is_steady(size(results))
@@ -55,9 +53,7 @@ contains
       if (allocated(error)) return
     end if
     if (any(results%mode == 0)) then
-      call new_analysis('response', command)
-      call assemble_analysed('response', command, input, machine, error)
-      if (.not. allocated(error)) call analyse_response(input, machine, analysis, error)
+      call find_response(input, analysis, error)
       if (allocated(error)) return
     end if
     if (any(results%is_crossing)) then
@@ -106,6 +102,19 @@ contains
       end associate
     end do
   end subroutine find_crossings
+
+  !> The response of an input.
+  subroutine find_response(input, response, error)
+    type(input_t), intent(in) :: input
+    type(response_analysis_t), intent(out) :: response
+    type(error_t), allocatable, intent(out) :: error
+    class(analysis_t), allocatable :: command
+    type(machine_t) :: machine
+
+    call new_analysis('response', command)
+    call assemble_analysed('response', command, input, machine, error)
+    if (.not. allocated(error)) call analyse_response(input, machine, response, error)
+  end subroutine find_response
 
   !> The diagram of Campbell of an input.
   subroutine find_campbell(input, campbell, error, orders)
@@ -269,16 +278,12 @@ contains
     real(wp), allocatable, intent(out) :: valleys(:)     !! ascending [rad/s]
     type(error_t), allocatable, intent(out) :: error
     real(wp), parameter :: high = 0.5_wp, deep = 0.999_wp   ! of the highest peak; of the lower one of two peaks
-    class(analysis_t), allocatable :: command
-    type(machine_t) :: machine
     type(response_analysis_t) :: analysis
     real(wp), allocatable :: amplitude(:)
     integer :: i, lowest, peak   ! points: the lowest one since the last peak, which is the highest one since the last valley
 
     allocate (valleys(0))
-    call new_analysis('response', command)
-    call assemble_analysed('response', command, input, machine, error)
-    if (.not. allocated(error)) call analyse_response(input, machine, analysis, error)
+    call find_response(input, analysis, error)
     if (allocated(error)) return
     allocate (amplitude(size(analysis%response%points)))
     call find_curve(analysis, one, line_order(analysis%response%lines, one%order), amplitude, error)
