@@ -47,16 +47,17 @@ contains
 
   subroutine read_bodies()
     character(len=64) :: name
-    real(wp) :: bearing_friction, inertia, angle, speed
+    real(wp) :: bearing_friction, inertia, angle, speed, speed_rpm
     integer :: status
-    namelist /body/ name, inertia, angle, speed, bearing_friction
+    namelist /body/ name, inertia, angle, speed, speed_rpm, bearing_friction
 
     rewind (unit)
     do
-      angle = 0.0_wp; speed = 0.0_wp; bearing_friction = 0.0_wp
+      angle = 0.0_wp; speed = 0.0_wp; speed_rpm = not_given; bearing_friction = 0.0_wp
       read (unit, nml=body, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'body'
+      if (speed_rpm > not_given) speed = speed_rpm * hertz / 60.0_wp
       print '(*(g0, 1x))', 'body', trim(name), inertia, angle, speed, bearing_friction
     end do
   end subroutine read_bodies
@@ -64,11 +65,13 @@ contains
   subroutine read_couplings()
     character(len=64) :: name, bodies(2), interpolation, extrapolation
     real(wp) :: stiffness, cubic_stiffness, damping, rest_twist, gap, saturation, friction, friction_speed
+    real(wp) :: relative_damping, damping_frequency, damping_frequency_hz
     real(wp), dimension(most_numbers) :: polynomial, table_twist, table_moment
     character(len=16) :: kind
     integer :: status
     namelist /coupling/ name, kind, bodies, stiffness, cubic_stiffness, polynomial, damping, rest_twist, gap, saturation, &
-      friction, friction_speed, table_twist, table_moment, interpolation, extrapolation
+      friction, friction_speed, relative_damping, damping_frequency, damping_frequency_hz, table_twist, table_moment, &
+      interpolation, extrapolation
 
     rewind (unit)
     do
@@ -81,6 +84,9 @@ contains
       saturation = not_given
       friction = 0.0_wp
       friction_speed = 0.01_wp
+      relative_damping = not_given
+      damping_frequency = not_given
+      damping_frequency_hz = not_given
       table_twist = not_given
       table_moment = not_given
       interpolation = 'linear'
@@ -88,9 +94,10 @@ contains
       read (unit, nml=coupling, iostat=status)
       if (is_iostat_end(status)) exit
       if (status /= 0) error stop 'coupling'
+      if (damping_frequency_hz > not_given) damping_frequency = damping_frequency_hz * hertz
       print '(*(g0, 1x))', 'coupling', trim(name), trim(bodies(1)), trim(bodies(2)), stiffness, cubic_stiffness, polynomial, &
-        damping, rest_twist, gap, saturation, friction, friction_speed, table_twist, table_moment, trim(interpolation), &
-        trim(extrapolation)
+        damping, rest_twist, gap, saturation, friction, friction_speed, relative_damping, damping_frequency, table_twist, &
+        table_moment, trim(interpolation), trim(extrapolation)
     end do
   end subroutine read_couplings
 
