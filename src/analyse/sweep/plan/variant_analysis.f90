@@ -85,7 +85,10 @@ contains
     integer :: c, i
     real(wp), allocatable :: orders(:)
 
-    orders = pack(results%order, results%is_crossing)   ! one may come more than once
+    allocate (orders(0))   ! one may come more than once
+    do i = 1, size(results)
+      if (results(i)%is_crossing) orders = [orders, results(i)%order]
+    end do
     call find_campbell(input, campbell, error, orders)
     if (allocated(error)) return
     do i = 1, size(results)
