@@ -3,19 +3,22 @@
 !> In a steady state the torques on all coordinates c balance, sum of U_ec w_e m_e = 0, with the moments m_e of the elements e,
 !> their weights w_e, which are 1 but of motors that hold a speed, and the twists U; the internal states x have the rates 0; a
 !> speed may be held. The unknowns are the angles and the speeds of the coordinates, x, and what holds the speed: the weight of
-!> the motors, the throttle of one with a governor, or a torque. A number p moves the state by u' = -(R_u)^-1 R_p of these
-!> equations R = 0, and R_p are the changes of moments and rates in the state as it is.
+!> the motors, the throttle of one with a governor, the frequency of supplies, or a torque. A number p moves the state by
+!> u' = -(R_u)^-1 R_p of these equations R = 0, and R_p are the changes of moments and rates in the state as it is.
 module nocdyn_frozen_states
   use nocdyn_elements, only: element_values_t
   use nocdyn_equilibrium, only: mean_machine, t_infinity
   use nocdyn_errors, only: error_t
+  use nocdyn_held_drives, only: supply_machine
   use nocdyn_held_speeds, only: held_speeds_t, held_state_t
+  use nocdyn_joint_balance, only: joint_balance_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack_lu, only: lu_factor, lu_solve
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_state, only: machine_state_t, new_machine_state
   use nocdyn_slopes, only: new_slopes
   use nocdyn_torque_balance, only: torque_balance_t
+  use nocdyn_varied_keys, only: central, find_weights, points
   implicit none (type, external)
   private
 
@@ -38,6 +41,7 @@ module nocdyn_frozen_states
     real(wp), allocatable :: internal(:)          !! [internal states]
     real(wp), allocatable :: angle(:), speed(:)   !! [bodies]
     real(wp) :: factor = 0.0_wp                   !! of the weights of the motors that hold the speed
+    real(wp) :: supply = 0.0_wp                   !! of the share of the supplies that holds it
   end type displacement_t
 
   !> A steady state.
@@ -45,6 +49,7 @@ module nocdyn_frozen_states
     logical :: is_frozen = .false.         !! whether it is known how it moves
     type(held_state_t) :: state
     real(wp), allocatable, private :: internal(:)   !! [internal states]
+    type(joint_balance_t), private :: joints        !! which slip
     real(wp), allocatable, private :: weight(:)     !! [elements]
     integer, allocatable, private :: driving(:)     !! elements whose weight holds the speed
     integer, allocatable, private :: first(:), coordinate(:)   !! U, as of `element_coordinates_t`
@@ -58,7 +63,7 @@ module nocdyn_frozen_states
     real(wp), private :: lead = 0.0_wp     !! the time in which the reference body turns by the angle that it has otherwise [s]
   contains
     procedure :: move
-    procedure, private :: list_matrix, factor_matrix, twists_of
+    procedure, private :: list_matrix, hold_speed, differentiate_supply, add_torque, factor_matrix, twists_of
   end type frozen_state_t
 
 contains
@@ -94,13 +99,18 @@ contains
       elements%angle(1, :) = frozen%state%twist
       elements%speed(1, :) = frozen%state%rate
       elements%internal%value(1, :) = frozen%internal
+      if (frozen%state%supply > 0) call supply_machine(self%machine, self%state, frozen%state%supply)
       if (present(displacement)) then
         if (.not. displacement%is_none) then
+          if (frozen%state%supply > 0) then
+            call supply_machine(self%machine, self%state, frozen%state%supply + step * displacement%supply)
+          end if
           elements%angle(1, :) = elements%angle(1, :) + step * displacement%twist
           elements%speed(1, :) = elements%speed(1, :) + step * displacement%rate
           elements%internal%value(1, :) = elements%internal%value(1, :) + step * displacement%internal
         end if
       end if
+      if (frozen%joints%count > 0) call frozen%joints%choose_modes(self%machine, self%state)
       call self%state%choose_branches(self%machine, t)
       call self%state%evaluate_elements(self%machine, t)
     end associate
@@ -135,25 +145,27 @@ contains
     end associate
   end subroutine state_at
 
-  !> Keeps a state that has just been held. Unknown is how states move that joints, drives or supplies hold.
+  !> Keeps a state that has just been held. Unknown is how states move beside which supplies idle.
   subroutine freeze_held(held, state, self)
     type(held_speeds_t), intent(in) :: held
     type(held_state_t), intent(in) :: state
     type(frozen_state_t), intent(out) :: self
     real(wp), allocatable :: matrix(:, :)
-    integer :: c, e, i, k, n
-    logical :: closes(size(held%sources))
+    integer :: i
+    logical :: closes(size(held%sources)), is_held
 
     self%state = state
     self%weight = held%weight
+    is_held = .not. (held%is_free .or. allocated(held%carried))
     associate (balance => held%balance, elements => held%balance%formulation%state%elements, &
                internal => held%balance%formulation%machine%elements%internal)
       self%internal = elements%internal%value(1, :)
       allocate (self%driving(0))
-      if (held%is_free .or. held%supply_holds .or. allocated(held%carried) .or. is_special(balance)) return
-      self%reference = held%reference
+      if ((held%supply_holds .and. .not. held%motors_hold) .or. is_special(balance) .or. .not. all_slip(balance)) return
+      self%joints = balance%joints
+      if (.not. held%is_free) self%reference = held%reference
       self%lead = held%lead
-      if (held%motors_hold) then
+      if (is_held .and. held%motors_hold .and. .not. held%supply_holds) then
         self%driving = balance%inelastic(held%sources)
         closes = abs(self%weight(self%driving) - state%factor) > 0
         if (any(closes)) then
@@ -166,38 +178,90 @@ contains
           allocate (self%driving(0))
         end if
       end if
-      call self%list_matrix(balance, merge(0, 1, self%closed > 0), matrix)
-      ! the speed of the reference body stays
-      n = balance%coordinates + internal%count + 1
-      if (self%closed > 0) n = balance%coordinates + self%closed
-      matrix(n, :) = 0.0_wp
-      matrix(n, size(self%angles) + 1:size(self%angles) + size(held%ratio)) = held%ratio
-      if (self%closed == 0) then
-        associate (column => matrix(:, size(matrix, 2)))
-          if (held%motors_hold) then
-            do i = 1, size(self%driving)
-              e = self%driving(i)
-              do k = self%first(e), self%first(e + 1) - 1
-                c = self%coordinate(k)
-                column(c) = column(c) + self%ratio(k) * (elements%restoring(1, e) + elements%applied(1, e))
-              end do
-            end do
-          else
-            associate (map => balance%formulation%machine%coordinates)
-              do k = map%first(self%reference), map%first(self%reference + 1) - 1
-                column(map%coordinate(k)) = column(map%coordinate(k)) + map%ratio(1, k)
-              end do
-            end associate
-          end if
-        end associate
-      end if
+      call self%list_matrix(balance, merge(1, 0, is_held .and. self%closed == 0), matrix)
+      if (is_held) call self%hold_speed(held, matrix)
       call self%factor_matrix(matrix)
     end associate
   end subroutine freeze_held
 
+  !> The row of the speed of the reference body, which stays, and the column of what holds it.
+  subroutine hold_speed(self, held, matrix)
+    class(frozen_state_t), intent(in) :: self
+    type(held_speeds_t), intent(in) :: held
+    real(wp), intent(inout) :: matrix(:, :)
+    integer :: e, i, k, n
+
+    associate (balance => held%balance, elements => held%balance%formulation%state%elements)
+      n = size(matrix, 1)
+      if (self%closed > 0) n = balance%coordinates + self%closed
+      matrix(n, :) = 0.0_wp
+      matrix(n, size(self%angles) + 1:size(self%angles) + size(held%ratio)) = held%ratio
+      if (self%closed > 0) return
+      associate (column => matrix(:, size(matrix, 2)))
+        if (held%supply_holds) then
+          call self%differentiate_supply(balance, column)
+        else if (held%motors_hold) then
+          do i = 1, size(self%driving)
+            e = self%driving(i)
+            call self%add_torque(e, elements%restoring(1, e) + elements%applied(1, e), column)
+          end do
+        else
+          associate (map => balance%formulation%machine%coordinates)
+            do k = map%first(self%reference), map%first(self%reference + 1) - 1
+              column(map%coordinate(k)) = column(map%coordinate(k)) + map%ratio(1, k)
+            end do
+          end associate
+        end if
+      end associate
+    end associate
+  end subroutine hold_speed
+
+  !> The derivatives of the equations by the share of the supplies.
+  subroutine differentiate_supply(self, balance, column)
+    class(frozen_state_t), intent(in) :: self
+    type(torque_balance_t), intent(in) :: balance
+    real(wp), intent(inout) :: column(:)
+    real(wp), parameter :: step = 2.0e-4_wp   ! small beside the slips at which the torques turn
+    type(mean_laws_t) :: laws
+    type(displacement_t) :: displacement
+    real(wp) :: weight(points), weight_here
+    integer :: e, p
+
+    laws%machine = balance%formulation%machine
+    laws%state = balance%formulation%state
+    displacement%is_none = .false.
+    displacement%supply = self%state%supply
+    allocate (displacement%twist, source=0.0_wp * self%state%twist)
+    allocate (displacement%rate, source=0.0_wp * self%state%rate)
+    allocate (displacement%internal, source=0.0_wp * self%internal)
+    call find_weights(self%state%supply * step * central, weight, weight_here)
+    do p = 1, points
+      call laws%evaluate_at(self, displacement, step * central(p))
+      associate (elements => laws%state%elements, f => balance%coordinates)
+        do e = 1, size(self%weight)
+          call self%add_torque(e, weight(p) * self%weight(e) * (elements%restoring(1, e) + elements%applied(1, e)), column)
+        end do
+        column(f + 1:f + balance%internal) = column(f + 1:f + balance%internal) + weight(p) * elements%internal%rate(1, :)
+      end associate
+    end do
+  end subroutine differentiate_supply
+
+  !> Adds a moment of an element to torques on the coordinates.
+  pure subroutine add_torque(self, element, moment, torque)
+    class(frozen_state_t), intent(in) :: self
+    integer, intent(in) :: element
+    real(wp), intent(in) :: moment        !! [N m]
+    real(wp), intent(inout) :: torque(:)  !! [N m], of the coordinates first
+    integer :: k
+
+    do k = self%first(element), self%first(element + 1) - 1
+      torque(self%coordinate(k)) = torque(self%coordinate(k)) + self%ratio(k) * moment
+    end do
+  end subroutine add_torque
+
   !> Keeps a steady state in which nothing is held. The balance is evaluated and differentiated there.
   subroutine freeze_equilibrium(balance, self)
-    type(torque_balance_t), intent(in) :: balance   !! without joints
+    type(torque_balance_t), intent(in) :: balance
     type(frozen_state_t), intent(out) :: self
     real(wp), allocatable :: matrix(:, :)
 
@@ -207,7 +271,8 @@ contains
       self%internal = elements%internal%value(1, :)
       self%weight = spread(1.0_wp, 1, size(self%state%twist))
       allocate (self%driving(0))
-      if (is_special(balance)) return
+      if (is_special(balance) .or. .not. all_slip(balance)) return
+      self%joints = balance%joints
       call self%list_matrix(balance, 0, matrix)
       call self%factor_matrix(matrix)
     end associate
@@ -217,9 +282,21 @@ contains
   pure logical function is_special(balance)
     type(torque_balance_t), intent(in) :: balance
 
-    is_special = balance%joints%count > 0 .or. allocated(balance%drag) .or. &
+    is_special = balance%joints%teeth%count > 0 .or. allocated(balance%drag) .or. &
                  balance%coordinates + balance%internal > most_unknowns
   end function is_special
+
+  !> Whether all joints slip, none of them hardly.
+  pure logical function all_slip(balance)
+    type(torque_balance_t), intent(in) :: balance
+    real(wp), parameter :: hardly = 1.0e-6_wp   ! as a share of the largest speed
+
+    all_slip = balance%joints%count == 0
+    if (all_slip) return
+    associate (speed => abs(balance%formulation%state%elements%speed(1, :)))
+      all_slip = .not. any(balance%joints%is_at_rest) .and. all(speed(balance%joints%element) > hardly * maxval(speed))
+    end associate
+  end function all_slip
 
   !> R_u without what holds a speed: the rows of the coordinates and internal states, the columns of their angles, of the rigid
   !> motions and of the internal states.
@@ -269,10 +346,7 @@ contains
       associate (internal => machine%elements%internal, values => elements%internal)
         do i = 1, internal%count
           e = internal%element(i)
-          do k = self%first(e), self%first(e + 1) - 1
-            matrix(self%coordinate(k), f + i) = matrix(self%coordinate(k), f + i) &
-                                                + self%ratio(k) * self%weight(e) * values%applied(1, i)
-          end do
+          call self%add_torque(e, self%weight(e) * values%applied(1, i), matrix(:, f + i))
           matrix(f + i, f - r + 1:f) = values%rate_speed(1, i) * rate(e, :)
           do m = 1, internal%members(i)
             matrix(f + i, f + internal%first(i) + m - 1) = values%rate_internal(1, m, i)
@@ -333,16 +407,14 @@ contains
     real(wp), intent(in) :: rate(:)     !! [internal states]
     type(displacement_t) :: displacement
     real(wp) :: q(size(self%motion, 1)), speed(size(self%motion, 1)), u(size(self%pivots))
-    integer :: e, k
+    integer :: e
 
     displacement%is_none = .not. (any(abs(moment) > 0) .or. any(abs(rate) > 0))
     if (displacement%is_none) return
     u = 0.0_wp
     associate (f => size(q), r => size(self%motion, 2))
       do e = 1, size(moment)
-        do k = self%first(e), self%first(e + 1) - 1
-          u(self%coordinate(k)) = u(self%coordinate(k)) - self%ratio(k) * self%weight(e) * moment(e)
-        end do
+        call self%add_torque(e, -self%weight(e) * moment(e), u)
       end do
       u(f + 1:f + size(rate)) = -rate
       if (self%closed > 0) u(f + self%closed) = 0.0_wp
@@ -354,11 +426,12 @@ contains
       speed = matmul(self%motion, u(f - r + 1:f))
       displacement%internal = u(f + 1:f + size(rate))
       if (size(self%driving) > 0) displacement%factor = u(size(u))
+      if (self%state%supply > 0) displacement%supply = u(size(u))
       displacement%twist = self%twists_of(q)
       displacement%rate = self%twists_of(speed)
-      if (self%reference == 0) return
       displacement%speed = machine%coordinates%body_speeds(1, speed)
       displacement%angle = machine%coordinates%body_speeds(1, q) - self%lead * displacement%speed
+      if (self%reference == 0) return
       displacement%angle = displacement%angle - self%state%omega * (displacement%angle(self%reference) &
                                                                     / self%state%omega(self%reference))
     end associate

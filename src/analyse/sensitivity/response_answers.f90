@@ -59,6 +59,7 @@ contains
     self%parts%frame = new_frame(self%parts%analysis%response%machine)
     self%parts%laws%machine = self%parts%analysis%response%held%balance%formulation%machine
     self%parts%laws%state = self%parts%analysis%response%held%balance%formulation%state
+    if (allocated(machine%driven_speed)) self%parts%laws%machine%driven_speed = machine%driven_speed
     summary = summarise_response(self%parts%analysis)
     call choose_criticals(self%parts%analysis, summary, most, chosen, notes)
     allocate (self%parts%criticals(size(chosen)))

@@ -10,6 +10,8 @@ module nocdyn_held_drives
   use nocdyn_formulation, only: formulation_t
   use nocdyn_governed_banks, only: governed_bank_t
   use nocdyn_kinds, only: wp
+  use nocdyn_machine, only: machine_t
+  use nocdyn_machine_state, only: machine_state_t
   use nocdyn_steady_start, only: find_operating_state
   use nocdyn_text, only: quoted, string_t
   use nocdyn_torque_balance, only: torque_balance_t
@@ -17,7 +19,7 @@ module nocdyn_held_drives
   private
 
   public :: all_follow, close_speed_loops, find_free_speeds, follow_free_speeds, idle_share, refuse_standing_friction, &
-    set_supplies, sources_of
+    set_supplies, sources_of, supply_machine
 
 contains
 
@@ -55,20 +57,31 @@ contains
     end associate
   end function all_follow
 
-  !> Gives all supplies a frequency.
+  !> Gives all supplies of a balance a frequency.
   subroutine set_supplies(balance, share)
     type(torque_balance_t), intent(inout) :: balance
     real(wp), intent(in) :: share   !! of the frequency in the input
+
+    associate (formulation => balance%formulation)
+      call supply_machine(formulation%machine, formulation%state, share)
+    end associate
+  end subroutine set_supplies
+
+  !> Gives all supplies of a machine a frequency.
+  subroutine supply_machine(machine, state, share)
+    type(machine_t), intent(inout) :: machine
+    type(machine_state_t), intent(inout) :: state
+    real(wp), intent(in) :: share   !! of the frequency in the input
     integer :: b
 
-    do b = 1, size(balance%formulation%machine%banks)
-      associate (bank => balance%formulation%machine%banks(b)%bank)
+    do b = 1, size(machine%banks)
+      associate (bank => machine%banks(b)%bank)
         if (.not. bank%follows_supply()) cycle
         call bank%set_supply(share)
-        call balance%formulation%state%banks(b)%refresh_lane(bank, 1)
+        call state%banks(b)%refresh_lane(bank, 1)
       end associate
     end do
-  end subroutine set_supplies
+  end subroutine supply_machine
 
   !> The share of the frequency at which the first motor has no slip, after `evaluate`.
   real(wp) function idle_share(balance, sources)
