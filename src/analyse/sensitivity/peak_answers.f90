@@ -32,7 +32,7 @@ module nocdyn_peak_answers
 
   integer, parameter :: kinds(4) = [statistic_min, statistic_time_of_min, statistic_max, statistic_time_of_max]
   real(wp), parameter :: fine = 1.0e-10_wp     ! relative tolerance of the run whose peaks are sought
-  real(wp), parameter :: usual = 1.0e-9_wp     ! of the derivatives
+  real(wp), parameter :: usual = 2.0e-9_wp     ! of the derivatives
 
   !> A peak of a run.
   type :: run_peak_t

@@ -2,7 +2,7 @@
 !>
 !> What is differentiated is evaluated for the machines of the input with numbers p + k h beside p, and everything else, motions
 !> and eigenvectors, stays as it is. The numbers of a linear machine are smooth functions of those of the input, mostly powers:
-!> where the steady state stays too, nothing is iterated, and two points have nine digits (h = 4e-6 p). Where it is found anew,
+!> where the steady state stays too, nothing is iterated, and four points have ten digits (h = 1e-3 p). Where it is found anew,
 !> differences of the sixth order over k = -3 ... 3 keep its tolerance small (h = 2e-3 p). Where a key does not allow p + k h on
 !> one side, the points are on the other one.
 module nocdyn_varied_keys
@@ -20,10 +20,10 @@ module nocdyn_varied_keys
   public :: find_weights, list_varied_keys, set_key
 
   integer, parameter, public :: points = 6                   !! of a difference with steady states that are found anew
-  integer, parameter, public :: near_points = 2              !! of one with states that stay
+  integer, parameter, public :: near_points = 4              !! of one with states that stay
   integer, parameter :: most_of_a_list = 12                  ! numbers of a list that are looked at one by one
   real(wp), parameter :: relative_step = 2.0e-3_wp           ! h, as a share of the number; of angles at least [rad]
-  real(wp), parameter :: near_step = 4.0e-6_wp               ! the same of near points; of angles [rad]
+  real(wp), parameter :: near_step = 1.0e-3_wp               ! the same of near points; of angles [rad]
   integer, parameter, public :: central(points) = [-3, -2, -1, 1, 2, 3]
   integer, parameter :: one_sided(points) = [1, 2, 3, 4, 5, 6]
 
@@ -147,7 +147,7 @@ contains
     call find_weights(key%change, key%weight, key%weight_here)
     step = near_step * abs(key%value)
     if (rule%unit == 'rad') step = near_step
-    key%near = step * [-1, 1]
+    key%near = step * [-2, -1, 1, 2]
     if (side > 0) key%near = sign(step, key%change(1)) * one_sided(:near_points)
     call find_weights(key%near, key%near_weight, key%near_weight_here)
   end subroutine find_key
