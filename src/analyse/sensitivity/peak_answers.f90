@@ -23,7 +23,7 @@ module nocdyn_peak_answers
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_text, only: append, joined, rounded_text, string_t
   use nocdyn_transient, only: build_formulation
-  use nocdyn_varied_keys, only: near_points, points, set_key, varied_key_t
+  use nocdyn_varied_keys, only: near_points, set_key, varied_key_t
   use nocdyn_varied_motions, only: changed_pair_t, varied_motion_t
   implicit none (type, external)
   private
@@ -210,29 +210,18 @@ contains
     class(formulation_t), intent(in) :: machine   !! of the input
     type(changed_pair_t), intent(out) :: changed
     type(error_t), allocatable, intent(out) :: error
-    class(formulation_t), allocatable :: other
     real(wp) :: start(1, machine%states), starts(1, machine%states)
     integer :: k
-    logical :: starts_alike
 
     changed%key = key
     changed%scale = abs(key%value)
     start = machine%start()
-    starts_alike = .true.
+    allocate (changed%start(machine%states), source=key%near_weight_here * start(1, :))
     do k = 1, near_points
       call assemble_like(input, key, key%near(k), machine, changed%near(k)%its, error)
       if (allocated(error)) return
       starts = changed%near(k)%its%start()
-      starts_alike = starts_alike .and. .not. any(abs(starts - start) > 0)
-    end do
-    allocate (changed%start(machine%states), source=0.0_wp)
-    if (starts_alike) return
-    changed%start = key%weight_here * start(1, :)
-    do k = 1, points
-      call assemble_like(input, key, key%change(k), machine, other, error)
-      if (allocated(error)) return
-      starts = other%start()
-      changed%start = changed%start + key%weight(k) * starts(1, :)
+      changed%start = changed%start + key%near_weight(k) * starts(1, :)
     end do
     changed%start = changed%scale * changed%start
   end subroutine change_machine
