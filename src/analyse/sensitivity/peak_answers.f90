@@ -4,7 +4,7 @@
 !> of the signal at the time of the peak. At an end of the run it is the same, because that time stays.
 module nocdyn_peak_answers
   use nocdyn_answers, only: answer_t
-  use nocdyn_assembly, only: allocate_formulation, assemble_machine
+  use nocdyn_assembly, only: assemble_machine
   use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_formulation, only: formulation_t
   use nocdyn_input, only: input_t
@@ -14,6 +14,7 @@ module nocdyn_peak_answers
   use nocdyn_limit_groups, only: limited_signal
   use nocdyn_machine, only: machine_t
   use nocdyn_measured_runs, only: merged_times
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_run_verdict, only: peak_keys
   use nocdyn_sampler, only: sampler, sampler_t
   use nocdyn_signal_values, only: new_signal_values, signal_values_t
@@ -31,6 +32,7 @@ module nocdyn_peak_answers
   public :: find_peak_answers
 
   integer, parameter :: kinds(4) = [statistic_min, statistic_time_of_min, statistic_max, statistic_time_of_max]
+  integer, parameter :: lanes = 16             ! of changed machines that are evaluated together
   real(wp), parameter :: fine = 1.0e-10_wp     ! relative tolerance of the run whose peaks are sought
   real(wp), parameter :: usual = 2.0e-9_wp     ! of the derivatives
 
@@ -55,6 +57,7 @@ contains
     type(string_t), allocatable :: run_notes(:)
     type(run_peak_t), allocatable :: peaks(:)
     type(varied_motion_t) :: motion
+    type(machine_t) :: wide
     integer, allocatable :: numbers(:)
     real(wp), allocatable :: slopes(:, :)
     real(wp) :: from, span(2)
@@ -78,7 +81,9 @@ contains
     call find_peaks(input, formulation, settings, span, from, peaks, error)
     if (.not. allocated(error)) call change_machines(input, keys, motion, numbers, notes, error)
     if (.not. allocated(error)) then
-      call motion%prepare()
+      call assemble_machine(input, wide, error, lanes)
+      if (allocated(error)) return
+      call motion%prepare(wide)
       settings%method = 'rk853'
       settings%rtol = usual
       call differentiate_peaks(motion, settings, span(1), peaks, slopes, error)
@@ -207,7 +212,7 @@ contains
   subroutine change_machine(input, key, machine, changed, error)
     type(input_t), intent(inout) :: input   !! has another number afterwards
     type(varied_key_t), intent(in) :: key
-    class(formulation_t), intent(in) :: machine   !! of the input
+    class(reduced_t), intent(in) :: machine       !! of the input
     type(changed_pair_t), intent(out) :: changed
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: start(1, machine%states), starts(1, machine%states)
@@ -226,13 +231,14 @@ contains
     changed%start = changed%scale * changed%start
   end subroutine change_machine
 
-  !> The equations of a machine, without an energy balance.
+  !> The equations of a machine, without an energy balance, laid out as those of lanes.
   subroutine formulate(machine, formulation)
     type(machine_t), intent(in) :: machine
-    class(formulation_t), allocatable, intent(out) :: formulation
+    class(reduced_t), allocatable, intent(out) :: formulation
 
-    call allocate_formulation('reduced', formulation)
+    allocate (reduced_t :: formulation)
     formulation%machine = machine
+    formulation%is_block = .true.
     call formulation%formulate(.false.)
   end subroutine formulate
 
@@ -241,8 +247,8 @@ contains
     type(input_t), intent(inout) :: input
     type(varied_key_t), intent(in) :: key
     real(wp), intent(in) :: change
-    class(formulation_t), intent(in) :: machine
-    class(formulation_t), allocatable, intent(out) :: changed
+    class(reduced_t), intent(in) :: machine
+    class(reduced_t), allocatable, intent(out) :: changed
     type(error_t), allocatable, intent(out) :: error
     type(machine_t) :: assembled
     logical :: is_alike

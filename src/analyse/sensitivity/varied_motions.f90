@@ -7,16 +7,18 @@
 !> N. J. Kong, J. J. Payne, J. Zhu, A. M. Johnson, Saltation Matrices: The Essential Tool for Linearizing Hybrid Dynamical
 !> Systems, arXiv:2306.06862, 2023, derive the jump; here the state is continuous, and numbers move the time of the change too.
 module nocdyn_varied_motions
-  use nocdyn_formulation, only: formulation_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lane_parameters, only: lane_parameters_t
+  use nocdyn_machine, only: machine_t
+  use nocdyn_reduced, only: reduced_t
   use nocdyn_system, only: evaluation_ok, pattern_t, system_t
   use nocdyn_varied_keys, only: near_points, varied_key_t
   implicit none (type, external)
   private
 
-  !> The equations of a machine without an energy balance.
+  !> The equations of a machine without an energy balance, laid out as those of lanes.
   type, public :: formulation_slot_t
-    class(formulation_t), allocatable :: its
+    class(reduced_t), allocatable :: its
   end type formulation_slot_t
 
   !> Machines with a number changed, at the near points of its key.
@@ -27,10 +29,20 @@ module nocdyn_varied_motions
     real(wp), allocatable :: start(:)       !! s at the start, [states of the machine]
   end type changed_pair_t
 
+  !> Changed machines in the lanes of one formulation, which evaluates them together.
+  type :: changed_lanes_t
+    class(reduced_t), allocatable :: its
+    integer, allocatable :: number(:), point(:)     ! in `changed`, and of its near points, of the first lanes
+    integer, allocatable :: status(:)               ! work space, as all that follow
+    real(wp), allocatable :: t(:), y(:, :), f(:, :)
+  end type changed_lanes_t
+
   type, extends(system_t), public :: varied_motion_t
-    class(formulation_t), allocatable :: machine    !! without an energy balance
+    class(reduced_t), allocatable :: machine        !! without an energy balance
     integer :: numbers = 0
     type(changed_pair_t), allocatable :: changed(:) !! the first `numbers` are in use
+    type(changed_lanes_t), allocatable, private :: blocks(:)
+    logical, allocatable, private :: is_alone(:, :) !! whether a changed machine fits no lane, [near points, numbers]
     integer :: own = 0                              !! states of the machine
     type(pattern_t), private :: pattern             !! of its Jacobian
     real(wp), allocatable, private :: dfdy(:, :), dfdt(:, :), f(:, :)   !! work space
@@ -44,8 +56,9 @@ module nocdyn_varied_motions
 contains
 
   !> Forms the equations, after `machine` and `changed` have been set.
-  subroutine prepare(self)
+  subroutine prepare(self, wide)
     class(varied_motion_t), intent(inout) :: self
+    type(machine_t), intent(in) :: wide   !! the machine in as many lanes as are evaluated together
 
     associate (machine => self%machine, copies => 1 + self%numbers)
       self%own = machine%states
@@ -57,7 +70,59 @@ contains
       self%pattern = machine%jacobian_pattern()
       allocate (self%dfdy(1, size(self%pattern%row)), self%dfdt(1, self%own), self%f(1, self%own), source=0.0_wp)
     end associate
+    call fill_lanes(self, wide)
   end subroutine prepare
+
+  !> Gives lanes the parameters of the changed machines, but of those with another structure.
+  subroutine fill_lanes(self, wide)
+    class(varied_motion_t), intent(inout) :: self
+    type(machine_t), intent(in) :: wide
+    type(lane_parameters_t) :: own, structure
+    integer :: b, j, k, lane, n
+
+    call structure%take(1)
+    call self%machine%pass_parameters(structure)
+    allocate (self%is_alone(near_points, self%numbers))
+    do j = 1, self%numbers
+      do k = 1, near_points
+        call own%take(1)
+        call self%changed(j)%near(k)%its%pass_parameters(own)
+        self%is_alone(k, j) = .not. structure%has_same_structure(own)
+      end do
+    end do
+    allocate (self%blocks((count(.not. self%is_alone) + wide%lanes - 1) / wide%lanes))
+    n = 0
+    do j = 1, self%numbers
+      do k = 1, near_points
+        if (self%is_alone(k, j)) cycle
+        b = n / wide%lanes + 1
+        lane = modulo(n, wide%lanes) + 1
+        if (lane == 1) call new_lanes(self%blocks(b), wide)
+        call own%take(1)
+        call self%changed(j)%near(k)%its%pass_parameters(own)
+        call own%give(lane)
+        associate (block => self%blocks(b))
+          call block%its%pass_parameters(own)
+          call block%its%refresh_lane(lane)
+          block%number = [block%number, j]
+          block%point = [block%point, k]
+        end associate
+        n = n + 1
+      end do
+    end do
+  end subroutine fill_lanes
+
+  !> Lanes that all hold the machine.
+  subroutine new_lanes(self, wide)
+    type(changed_lanes_t), intent(inout) :: self
+    type(machine_t), intent(in) :: wide
+
+    allocate (reduced_t :: self%its)
+    self%its%machine = wide
+    call self%its%formulate(.false.)
+    allocate (self%number(0), self%point(0), self%t(wide%lanes), self%status(wide%lanes))
+    allocate (self%y(wide%lanes, self%its%states), self%f(wide%lanes, self%its%states))
+  end subroutine new_lanes
 
   !> The state at the start, [1, states].
   function start(self) result(y)
@@ -109,7 +174,7 @@ contains
     real(wp), intent(in) :: y(self%lanes, self%states + self%quadratures)
     real(wp), intent(inout) :: dydt(self%lanes, self%states + self%quadratures)
     integer, intent(inout) :: status(self%lanes)
-    integer :: i, j, k
+    integer :: b, i, j, k
 
     associate (n => self%own)
       call self%machine%derivative(t, y(:, :n), dydt(:, :n), status)
@@ -117,21 +182,54 @@ contains
       do j = 1, self%numbers
         associate (changed => self%changed(j), before => self%of_number(j))
           dydt(:, before + 1:before + n) = changed%scale * changed%key%near_weight_here * dydt(:, :n)
-          do k = 1, near_points
-            if (status(1) /= evaluation_ok) return
-            call changed%near(k)%its%derivative(t, y(:, :n), self%f, status)
-            dydt(:, before + 1:before + n) = dydt(:, before + 1:before + n) + &
-                                             changed%scale * changed%key%near_weight(k) * self%f
-          end do
           do i = 1, size(self%pattern%row)
             associate (row => before + self%pattern%row(i), column => before + self%pattern%column(i))
               dydt(1, row) = dydt(1, row) + self%dfdy(1, i) * y(1, column)
             end associate
           end do
+          do k = 1, near_points
+            if (status(1) /= evaluation_ok) return
+            if (.not. self%is_alone(k, j)) cycle
+            call changed%near(k)%its%derivative(t, y(:, :n), self%f, status)
+            dydt(1, before + 1:before + n) = dydt(1, before + 1:before + n) + &
+                                             changed%scale * changed%key%near_weight(k) * self%f(1, :)
+          end do
         end associate
       end do
     end associate
+    do b = 1, size(self%blocks)
+      call add_lanes(self, self%blocks(b), t(1), y(1, :self%own), dydt(1, :), status(1))
+      if (status(1) /= evaluation_ok) return
+    end do
   end subroutine derivative
+
+  !> Adds what the changed machines of some lanes give to the derivatives.
+  subroutine add_lanes(self, lanes, t, y, dydt, status)
+    class(varied_motion_t), intent(in) :: self
+    type(changed_lanes_t), intent(inout) :: lanes
+    real(wp), intent(in) :: t
+    real(wp), intent(in) :: y(:)         !! of the machine
+    real(wp), intent(inout) :: dydt(:)   !! [states]
+    integer, intent(inout) :: status
+    integer :: i, l
+
+    lanes%t = t
+    lanes%status = evaluation_ok
+    do i = 1, size(y)
+      lanes%y(:, i) = y(i)
+    end do
+    call lanes%its%derivative(lanes%t, lanes%y, lanes%f, lanes%status)
+    do l = 1, size(lanes%number)
+      if (lanes%status(l) /= evaluation_ok) status = lanes%status(l)
+      associate (changed => self%changed(lanes%number(l)), before => self%of_number(lanes%number(l)))
+        associate (weight => changed%scale * changed%key%near_weight(lanes%point(l)))
+          do i = 1, size(y)
+            dydt(before + i) = dydt(before + i) + weight * lanes%f(l, i)
+          end do
+        end associate
+      end associate
+    end do
+  end subroutine add_lanes
 
   subroutine jacobian(self, t, y, dfdy, dfdt, status)
     class(varied_motion_t), intent(inout) :: self
@@ -222,6 +320,11 @@ contains
         call self%changed(j)%near(k)%its%start_lane(lane, t, y(:self%own))
       end do
     end do
+    do j = 1, size(self%blocks)
+      do k = 1, size(self%blocks(j)%t)
+        call self%blocks(j)%its%start_lane(k, t, y(:self%own))
+      end do
+    end do
     call take_branches(self)
   end subroutine start_lane
 
@@ -234,6 +337,13 @@ contains
       do k = 1, near_points
         associate (near => self%changed(j)%near(k)%its)
           call near%state%take_branches(near%machine, 1, self%machine%state, 1)
+        end associate
+      end do
+    end do
+    do j = 1, size(self%blocks)
+      do k = 1, size(self%blocks(j)%t)
+        associate (block => self%blocks(j)%its)
+          call block%state%take_branches(block%machine, k, self%machine%state, 1)
         end associate
       end do
     end do
