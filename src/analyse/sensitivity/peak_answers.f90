@@ -24,7 +24,7 @@ module nocdyn_peak_answers
   use nocdyn_statistics_observer, only: new_statistics_observer, statistics_observer_t
   use nocdyn_text, only: append, joined, rounded_text, string_t
   use nocdyn_transient, only: build_formulation
-  use nocdyn_varied_keys, only: near_points, set_key, varied_key_t
+  use nocdyn_varied_keys, only: run_points, set_key, varied_key_t
   use nocdyn_varied_motions, only: changed_pair_t, varied_motion_t
   implicit none (type, external)
   private
@@ -221,12 +221,12 @@ contains
     changed%key = key
     changed%scale = abs(key%value)
     start = machine%start()
-    allocate (changed%start(machine%states), source=key%near_weight_here * start(1, :))
-    do k = 1, near_points
-      call assemble_like(input, key, key%near(k), machine, changed%near(k)%its, error)
+    allocate (changed%start(machine%states), source=key%run_weight_here * start(1, :))
+    do k = 1, run_points
+      call assemble_like(input, key, key%run(k), machine, changed%near(k)%its, error)
       if (allocated(error)) return
       starts = changed%near(k)%its%start()
-      changed%start = changed%start + key%near_weight(k) * starts(1, :)
+      changed%start = changed%start + key%run_weight(k) * starts(1, :)
     end do
     changed%start = changed%scale * changed%start
   end subroutine change_machine
@@ -308,11 +308,11 @@ contains
     real(wp), intent(in) :: y(:)   !! at that time, [states]
     real(wp), intent(out) :: slope
     real(wp), parameter :: share = 1.0e-3_wp   ! of the state, by which it is changed
-    real(wp) :: near(near_points), step
+    real(wp) :: near(run_points), step
     integer :: k
 
     associate (own => y(:motion%own), s => y(motion%of_number(j) + 1:motion%of_number(j) + motion%own))
-      do k = 1, near_points
+      do k = 1, run_points
         near(k) = value_at(motion%changed(j)%near(k)%its, peak, own)
       end do
       step = share / max(1.0_wp, motion%relative_size(own, s))

@@ -2,9 +2,10 @@
 !>
 !> What is differentiated is evaluated for the machines of the input with numbers p + k h beside p, and everything else, motions
 !> and eigenvectors, stays as it is. The numbers of a linear machine are smooth functions of those of the input, mostly powers:
-!> where the steady state stays too, nothing is iterated, and four points have ten digits (h = 1e-3 p). Where it is found anew,
-!> differences of the sixth order over k = -3 ... 3 keep its tolerance small (h = 2e-3 p). Where a key does not allow p + k h on
-!> one side, the points are on the other one.
+!> where the steady state stays too, nothing is iterated, and two points have nine digits (h = 4e-6 p). Where it is found anew,
+!> differences of the sixth order over k = -3 ... 3 keep its tolerance small (h = 2e-3 p). Along a run, four points over k = -2
+!> ... 2 keep rounding below the tolerance of its steps (h = 1e-3 p). Where a key does not allow p + k h on one side, the points
+!> are on the other one.
 module nocdyn_varied_keys
   use nocdyn_input, only: group_t, input_t
   use nocdyn_kinds, only: wp
@@ -20,10 +21,12 @@ module nocdyn_varied_keys
   public :: find_weights, list_varied_keys, set_key
 
   integer, parameter, public :: points = 6                   !! of a difference with steady states that are found anew
-  integer, parameter, public :: near_points = 4              !! of one with states that stay
+  integer, parameter, public :: near_points = 2              !! of one with states that stay
+  integer, parameter, public :: run_points = 4               !! of one along a run
   integer, parameter :: most_of_a_list = 12                  ! numbers of a list that are looked at one by one
   real(wp), parameter :: relative_step = 2.0e-3_wp           ! h, as a share of the number; of angles at least [rad]
-  real(wp), parameter :: near_step = 1.0e-3_wp               ! the same of near points; of angles [rad]
+  real(wp), parameter :: near_step = 4.0e-6_wp               ! the same of near points; of angles [rad]
+  real(wp), parameter :: run_step = 1.0e-3_wp                ! and of those along a run
   integer, parameter, public :: central(points) = [-3, -2, -1, 1, 2, 3]
   integer, parameter :: one_sided(points) = [1, 2, 3, 4, 5, 6]
 
@@ -39,6 +42,9 @@ module nocdyn_varied_keys
     real(wp) :: near(near_points) = 0.0_wp           !! the same for near points
     real(wp) :: near_weight(near_points) = 0.0_wp
     real(wp) :: near_weight_here = 0.0_wp
+    real(wp) :: run(run_points) = 0.0_wp             !! the same for those along a run
+    real(wp) :: run_weight(run_points) = 0.0_wp
+    real(wp) :: run_weight_here = 0.0_wp
   end type varied_key_t
 
 contains
@@ -145,11 +151,17 @@ contains
     end do
     if (.not. is_possible) return
     call find_weights(key%change, key%weight, key%weight_here)
-    step = near_step * abs(key%value)
-    if (rule%unit == 'rad') step = near_step
-    key%near = step * [-2, -1, 1, 2]
-    if (side > 0) key%near = sign(step, key%change(1)) * one_sided(:near_points)
+    step = abs(key%value)
+    if (rule%unit == 'rad') step = 1.0_wp
+    key%near = near_step * step * [-1, 1]
+    key%run = run_step * step * [-2, -1, 1, 2]
+    if (side > 0) then
+      step = sign(step, key%change(1))
+      key%near = near_step * step * one_sided(:near_points)
+      key%run = run_step * step * one_sided(:run_points)
+    end if
     call find_weights(key%near, key%near_weight, key%near_weight_here)
+    call find_weights(key%run, key%run_weight, key%run_weight_here)
   end subroutine find_key
 
   !> Whether a key may have a changed number.

@@ -12,7 +12,7 @@ module nocdyn_varied_motions
   use nocdyn_machine, only: machine_t
   use nocdyn_reduced, only: reduced_t
   use nocdyn_system, only: evaluation_ok, pattern_t, system_t
-  use nocdyn_varied_keys, only: near_points, varied_key_t
+  use nocdyn_varied_keys, only: run_points, varied_key_t
   implicit none (type, external)
   private
 
@@ -21,18 +21,18 @@ module nocdyn_varied_motions
     class(reduced_t), allocatable :: its
   end type formulation_slot_t
 
-  !> Machines with a number changed, at the near points of its key.
+  !> Machines with a number changed, at the points of its key.
   type, public :: changed_pair_t
     type(varied_key_t) :: key
     real(wp) :: scale = 1.0_wp              !! |p|
-    type(formulation_slot_t) :: near(near_points)
+    type(formulation_slot_t) :: near(run_points)
     real(wp), allocatable :: start(:)       !! s at the start, [states of the machine]
   end type changed_pair_t
 
   !> Changed machines in the lanes of one formulation, which evaluates them together.
   type :: changed_lanes_t
     class(reduced_t), allocatable :: its
-    integer, allocatable :: number(:), point(:)     ! in `changed`, and of its near points, of the first lanes
+    integer, allocatable :: number(:), point(:)     ! in `changed`, and of its points, of the first lanes
     integer, allocatable :: status(:)               ! work space, as all that follow
     real(wp), allocatable :: t(:), y(:, :), f(:, :)
   end type changed_lanes_t
@@ -42,7 +42,7 @@ module nocdyn_varied_motions
     integer :: numbers = 0
     type(changed_pair_t), allocatable :: changed(:) !! the first `numbers` are in use
     type(changed_lanes_t), allocatable, private :: blocks(:)
-    logical, allocatable, private :: is_alone(:, :) !! whether a changed machine fits no lane, [near points, numbers]
+    logical, allocatable, private :: is_alone(:, :) !! whether a changed machine fits no lane, [run points, numbers]
     integer :: own = 0                              !! states of the machine
     type(pattern_t), private :: pattern             !! of its Jacobian
     real(wp), allocatable, private :: dfdy(:, :), dfdt(:, :), f(:, :)   !! work space
@@ -82,9 +82,9 @@ contains
 
     call structure%take(1)
     call self%machine%pass_parameters(structure)
-    allocate (self%is_alone(near_points, self%numbers))
+    allocate (self%is_alone(run_points, self%numbers))
     do j = 1, self%numbers
-      do k = 1, near_points
+      do k = 1, run_points
         call own%take(1)
         call self%changed(j)%near(k)%its%pass_parameters(own)
         self%is_alone(k, j) = .not. structure%has_same_structure(own)
@@ -93,7 +93,7 @@ contains
     allocate (self%blocks((count(.not. self%is_alone) + wide%lanes - 1) / wide%lanes))
     n = 0
     do j = 1, self%numbers
-      do k = 1, near_points
+      do k = 1, run_points
         if (self%is_alone(k, j)) cycle
         b = n / wide%lanes + 1
         lane = modulo(n, wide%lanes) + 1
@@ -157,14 +157,14 @@ contains
     ratio = maxval(abs(changes) / max(sizes, least * maxval(sizes), tiny(least)))
   end function relative_size
 
-  !> The derivative of a function by a number, times |p|, of its values at the near points and of the machine itself.
+  !> The derivative of a function by a number, times |p|, of its values at the points of its key and of the machine itself.
   pure real(wp) function by_number(self, j, near, here) result(slope)
     class(varied_motion_t), intent(in) :: self
     integer, intent(in) :: j   !! in `changed`
-    real(wp), intent(in) :: near(near_points), here
+    real(wp), intent(in) :: near(run_points), here
 
     associate (changed => self%changed(j))
-      slope = changed%scale * (dot_product(changed%key%near_weight, near) + changed%key%near_weight_here * here)
+      slope = changed%scale * (dot_product(changed%key%run_weight, near) + changed%key%run_weight_here * here)
     end associate
   end function by_number
 
@@ -181,18 +181,18 @@ contains
       if (status(1) == evaluation_ok) call self%machine%jacobian(t, y(:, :n), self%dfdy, self%dfdt, status)
       do j = 1, self%numbers
         associate (changed => self%changed(j), before => self%of_number(j))
-          dydt(:, before + 1:before + n) = changed%scale * changed%key%near_weight_here * dydt(:, :n)
+          dydt(:, before + 1:before + n) = changed%scale * changed%key%run_weight_here * dydt(:, :n)
           do i = 1, size(self%pattern%row)
             associate (row => before + self%pattern%row(i), column => before + self%pattern%column(i))
               dydt(1, row) = dydt(1, row) + self%dfdy(1, i) * y(1, column)
             end associate
           end do
-          do k = 1, near_points
+          do k = 1, run_points
             if (status(1) /= evaluation_ok) return
             if (.not. self%is_alone(k, j)) cycle
             call changed%near(k)%its%derivative(t, y(:, :n), self%f, status)
             dydt(1, before + 1:before + n) = dydt(1, before + 1:before + n) + &
-                                             changed%scale * changed%key%near_weight(k) * self%f(1, :)
+                                             changed%scale * changed%key%run_weight(k) * self%f(1, :)
           end do
         end associate
       end do
@@ -222,7 +222,7 @@ contains
     do l = 1, size(lanes%number)
       if (lanes%status(l) /= evaluation_ok) status = lanes%status(l)
       associate (changed => self%changed(lanes%number(l)), before => self%of_number(lanes%number(l)))
-        associate (weight => changed%scale * changed%key%near_weight(lanes%point(l)))
+        associate (weight => changed%scale * changed%key%run_weight(lanes%point(l)))
           do i = 1, size(y)
             dydt(before + i) = dydt(before + i) + weight * lanes%f(l, i)
           end do
@@ -316,7 +316,7 @@ contains
 
     call self%machine%start_lane(lane, t, y(:self%own))
     do j = 1, self%numbers
-      do k = 1, near_points
+      do k = 1, run_points
         call self%changed(j)%near(k)%its%start_lane(lane, t, y(:self%own))
       end do
     end do
@@ -334,7 +334,7 @@ contains
     integer :: j, k
 
     do j = 1, self%numbers
-      do k = 1, near_points
+      do k = 1, run_points
         associate (near => self%changed(j)%near(k)%its)
           call near%state%take_branches(near%machine, 1, self%machine%state, 1)
         end associate
@@ -419,7 +419,7 @@ contains
     real(wp), intent(in) :: rate(:)    !! of the machine before the change, [states of the machine]
     real(wp), intent(out) :: moves(:)
     real(wp), parameter :: step = 1.0e-4_wp, short = 1.0e-6_wp   ! relative: of a change of the state; of the duration
-    real(wp) :: change, fall, g(self%switches, 2), near(near_points), slope
+    real(wp) :: change, fall, g(self%switches, 2), near(run_points), slope
     integer :: j, k
 
     associate (own => y(:self%own))
@@ -434,7 +434,7 @@ contains
           call self%machine%set_indicator(which, 1, t, own - change * s, g(:, 2))
           slope = (g(which, 1) - g(which, 2)) / (2.0_wp * change)
         end associate
-        do k = 1, near_points
+        do k = 1, run_points
           call self%changed(j)%near(k)%its%set_indicator(which, 1, t, own, g(:, 1))
           near(k) = g(which, 1)
         end do
