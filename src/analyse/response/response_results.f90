@@ -23,7 +23,7 @@ module nocdyn_response_results
   character(len=*), parameter :: columns_name = 'response_columns.json'
 
   type, extends(analysis_t), public :: response_results_t
-    type(response_analysis_t), private :: analysis
+    type(response_analysis_t) :: analysis
     type(response_summary_t), private :: summary
   contains
     procedure :: solve, list_tables, put_table, grid_name, other_names, put_grid, judge, put_report, text => printed

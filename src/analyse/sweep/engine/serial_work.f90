@@ -66,22 +66,30 @@ contains
   end subroutine write_code
 
   !> The numbers that results ask for of one analysis of the machine of an input.
-  subroutine find_reported(word, input, wanted, values, error)
+  subroutine find_reported(word, input, wanted, solved, values, error)
     character(len=*), intent(in) :: word                    !! of `analysis_words`
     type(input_t), intent(in) :: input
     type(analysis_result_t), intent(in) :: wanted(:)        !! those of other analyses are left out
+    class(analysis_t), allocatable, intent(inout) :: solved !! it, if it is solved; not allocated afterwards
     real(wp), intent(inout) :: values(:)                    !! [results]
     type(error_t), allocatable, intent(out) :: error
     class(analysis_t), allocatable :: analysis
     type(machine_t) :: machine
+    logical :: is_solved
 
-    call new_analysis(word, analysis)
-    call assemble_analysed(word, analysis, input, machine, error)
-    if (.not. allocated(error) .and. analysis%is_for_threads) then
-      call analysis%solve(input, machine, analysis_options_t(at='', compares=.false.), error)
+    is_solved = allocated(solved)
+    if (is_solved) then
+      call move_alloc(solved, analysis)
+    else
+      call new_analysis(word, analysis)
+      call assemble_analysed(word, analysis, input, machine, error)
+      if (.not. allocated(error) .and. analysis%is_for_threads) then
+        call analysis%solve(input, machine, analysis_options_t(at='', compares=.false.), error)
+        is_solved = .true.
+      end if
     end if
     !$omp critical (texts)
-    if (.not. (allocated(error) .or. analysis%is_for_threads)) then
+    if (.not. (allocated(error) .or. is_solved)) then
       call analysis%solve(input, machine, analysis_options_t(at='', compares=.false.), error)
     end if
     if (.not. allocated(error)) then

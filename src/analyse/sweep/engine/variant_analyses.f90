@@ -1,6 +1,7 @@
 !> Modes, forced responses and other analyses of the variants of a sweep.
 module nocdyn_variant_analyses
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan, ieee_quiet_nan, ieee_value
+  use nocdyn_analyses, only: analysis_t
   use nocdyn_analysis_results, only: analysis_result_t
   use nocdyn_errors, only: error_t, exit_failed
   use nocdyn_finite, only: is_finite
@@ -48,6 +49,7 @@ contains
     type(variant_machines_t), intent(inout) :: machines
     type(chunk_t), intent(inout) :: chunk
     integer, intent(in) :: index   !! in the chunk
+    class(analysis_t), allocatable :: response
     type(error_t), allocatable :: error
     real(wp) :: results(size(plan%analyses)), values(size(plan%numbers%targets))
     integer :: i
@@ -58,8 +60,8 @@ contains
       chunk%status(index) = status_refused
       return
     end if
-    call analyse_variant(machines%input, plan%analyses, results, error)
-    if (.not. allocated(error)) call find_numbers(machines%input, plan%analyses, results, error)
+    call analyse_variant(machines%input, plan%analyses, results, error, response)
+    if (.not. allocated(error)) call find_numbers(machines%input, plan%analyses, response, results, error)
     if (allocated(error)) then
       chunk%status(index) = merge(status_failed, status_refused, error%code == exit_failed)
       call move_alloc(error%message, chunk%reasons(index)%text)
@@ -74,11 +76,13 @@ contains
   end subroutine analyse_one
 
   !> The numbers that are taken from the reports of analyses.
-  subroutine find_numbers(input, wanted, values, error)
+  subroutine find_numbers(input, wanted, response, values, error)
     type(input_t), intent(in) :: input
     type(analysis_result_t), intent(in) :: wanted(:)
+    class(analysis_t), allocatable, intent(inout) :: response   !! if it is solved
     real(wp), intent(inout) :: values(:)   !! [results]
     type(error_t), allocatable, intent(out) :: error
+    class(analysis_t), allocatable :: none
     integer :: i, k
 
     do k = 1, size(analysis_words)
@@ -87,7 +91,11 @@ contains
         if (wanted(i)%command == analysis_words(k)) exit
       end do
       if (i > size(wanted)) cycle
-      call find_reported(trim(analysis_words(k)), input, wanted, values, error)
+      if (analysis_words(k) == 'response') then
+        call find_reported('response', input, wanted, response, values, error)
+      else
+        call find_reported(trim(analysis_words(k)), input, wanted, none, values, error)
+      end if
       if (allocated(error)) return
     end do
   end subroutine find_numbers

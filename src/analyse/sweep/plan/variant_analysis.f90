@@ -1,7 +1,7 @@
 !> Computes the results of a machine that need no motion.
 module nocdyn_variant_analysis
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-  use nocdyn_analyses, only: analysis_t
+  use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_analysis_results, only: analysis_crossing, analysis_curve, analysis_damping_ratio, analysis_frequency, &
     analysis_margin, analysis_mode_curve, analysis_peak, analysis_peak_frequency, analysis_peak_speed, analysis_ratio, &
     analysis_result_t
@@ -19,6 +19,7 @@ module nocdyn_variant_analysis
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_response_analysis, only: analyse_response, response_analysis_t
   use nocdyn_moment_forms, only: kind_along, kind_moment, kind_stress, moment_form_t
+  use nocdyn_response_results, only: response_results_t
   use nocdyn_response_summary, only: worst_ratio
   use nocdyn_signals, only: former_name
   use nocdyn_text, only: to_text
@@ -36,14 +37,15 @@ contains
 
   !> Computes the results of one machine. A point of a curve is not a number where the machine has none: no steady state, one that
   !> does not stay, or an overdamped mode.
-  subroutine analyse_variant(input, results, values, error)
+  subroutine analyse_variant(input, results, values, error, solved)
     type(input_t), intent(in) :: input
-    type(analysis_result_t), intent(in) :: results(:)   !! paths are left out
+    type(analysis_result_t), intent(in) :: results(:)   !! those of reports are left out
     real(wp), intent(out) :: values(:)               !! [results]
     type(error_t), allocatable, intent(out) :: error
-    type(response_analysis_t) :: analysis
+    class(analysis_t), allocatable, intent(out), optional :: solved   !! the response, if there are results of its report too
     type(mode_t), allocatable :: modes(:)
-    logical :: is_steady(size(results))
+    type(response_results_t) :: response
+    logical :: is_of_report, is_steady(size(results))
     integer :: i
 
     values = 0.0_wp
@@ -53,8 +55,13 @@ contains
       if (allocated(error)) return
     end if
     if (any(results%mode == 0)) then
-      call find_response(input, analysis, error)
+      is_of_report = .false.
+      do i = 1, size(results)
+        if (present(solved) .and. results(i)%is_reported()) is_of_report = is_of_report .or. results(i)%command == 'response'
+      end do
+      call find_response(input, is_of_report, response, error)
       if (allocated(error)) return
+      if (is_of_report) allocate (solved, source=response)
     end if
     if (any(results%is_crossing)) then
       call find_crossings(input, results, values, error)
@@ -68,7 +75,7 @@ contains
       associate (one => results(i))
         if (one%statistic == analysis_frequency) values(i) = modes(one%mode)%frequency()
         if (one%statistic == analysis_damping_ratio) values(i) = modes(one%mode)%damping_ratio()
-        if (one%mode == 0) call find_response_value(analysis, one, values(i), error)
+        if (one%mode == 0) call find_response_value(response%analysis, one, values(i), error)
         values(i) = from_si(values(i), one%in_unit)
       end associate
       if (allocated(error)) return
@@ -107,16 +114,22 @@ contains
   end subroutine find_crossings
 
   !> The response of an input.
-  subroutine find_response(input, response, error)
+  subroutine find_response(input, is_of_report, response, error)
     type(input_t), intent(in) :: input
-    type(response_analysis_t), intent(out) :: response
+    logical, intent(in) :: is_of_report   !! whether all of its report is asked for
+    type(response_results_t), intent(out) :: response
     type(error_t), allocatable, intent(out) :: error
     class(analysis_t), allocatable :: command
     type(machine_t) :: machine
 
     call new_analysis('response', command)
     call assemble_analysed('response', command, input, machine, error)
-    if (.not. allocated(error)) call analyse_response(input, machine, response, error)
+    if (allocated(error)) return
+    if (is_of_report) then
+      call response%solve(input, machine, analysis_options_t(at='', compares=.false.), error)
+    else
+      call analyse_response(input, machine, response%analysis, error)
+    end if
   end subroutine find_response
 
   !> The diagram of Campbell of an input.
@@ -281,15 +294,15 @@ contains
     real(wp), allocatable, intent(out) :: valleys(:)     !! ascending [rad/s]
     type(error_t), allocatable, intent(out) :: error
     real(wp), parameter :: high = 0.5_wp, deep = 0.999_wp   ! of the highest peak; of the lower one of two peaks
-    type(response_analysis_t) :: analysis
+    type(response_results_t) :: response
     real(wp), allocatable :: amplitude(:)
     integer :: i, lowest, peak   ! points: the lowest one since the last peak, which is the highest one since the last valley
 
     allocate (valleys(0))
-    call find_response(input, analysis, error)
+    call find_response(input, .false., response, error)
     if (allocated(error)) return
-    allocate (amplitude(size(analysis%response%points)))
-    call find_curve(analysis, one, line_order(analysis%response%lines, one%order), amplitude, error)
+    allocate (amplitude(size(response%analysis%response%points)))
+    call find_curve(response%analysis, one, line_order(response%analysis%response%lines, one%order), amplitude, error)
     if (allocated(error)) return
     associate (least => high * maxval(amplitude))
       peak = 1
@@ -297,7 +310,7 @@ contains
       do i = 2, size(amplitude)
         if (min(amplitude(peak), amplitude(i)) * deep > amplitude(lowest) .and. &
             min(amplitude(peak), amplitude(i)) >= least) then
-          valleys = [valleys, analysis%response%points(lowest)%state%speed]
+          valleys = [valleys, response%analysis%response%points(lowest)%state%speed]
           peak = i
           lowest = i
         else if (amplitude(i) > amplitude(peak)) then
