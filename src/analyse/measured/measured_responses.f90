@@ -6,6 +6,7 @@ module nocdyn_measured_responses
   use nocdyn_forced_response, only: forced_response_t, new_forced_response
   use nocdyn_input, only: input_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: ascending_order
   use nocdyn_machine, only: machine_t
   use nocdyn_measurements, only: measured_order, measured_peak, measurement_t, peak_half_range, peak_largest, peak_smallest, &
     read_measurements
@@ -60,27 +61,13 @@ contains
   pure subroutine take_ascending(m, speeds, amplitudes)
     type(measurement_t), intent(in) :: m
     real(wp), allocatable, intent(out) :: speeds(:), amplitudes(:)
-    integer :: gap, i, k, order(size(m%abscissa)), this
+    integer :: order(size(m%abscissa))
+    logical :: is_inside(size(order))
 
-    order = [(i, i=1, size(order))]
-    gap = size(order) / 2
-    do while (gap > 0)   ! Shell's sort
-      do i = gap + 1, size(order)
-        this = order(i)
-        k = i
-        do while (k > gap)
-          if (abs(m%abscissa(order(k - gap))) <= abs(m%abscissa(this))) exit
-          order(k) = order(k - gap)
-          k = k - gap
-        end do
-        order(k) = this
-      end do
-      gap = gap / 2
-    end do
-    order = pack(order, m%abscissa(order) >= m%from .and. m%abscissa(order) <= m%until, order)
-    k = count(m%abscissa >= m%from .and. m%abscissa <= m%until)
-    allocate (speeds, source=m%abscissa(order(:k)))
-    allocate (amplitudes, source=m%values(order(:k)))
+    order = ascending_order(abs(m%abscissa))
+    is_inside = m%abscissa(order) >= m%from .and. m%abscissa(order) <= m%until
+    allocate (speeds, source=pack(m%abscissa(order), is_inside))
+    allocate (amplitudes, source=pack(m%values(order), is_inside))
   end subroutine take_ascending
 
   !> Amplitudes of an order of a signal, or its peaks, at speeds.

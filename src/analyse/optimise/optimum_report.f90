@@ -4,6 +4,7 @@ module nocdyn_optimum_report
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
+  use nocdyn_lapack, only: ascending_order
   use nocdyn_minimax, only: kept
   use nocdyn_optimum_search, only: candidate_t, optimum_t
   use nocdyn_output_file, only: output_file_t
@@ -192,8 +193,7 @@ contains
     integer, allocatable, intent(out) :: order(:)
     real(wp), parameter :: exceeded = 1.0e100_wp
     real(wp) :: merit(size(candidates))
-    logical :: is_left(size(candidates))
-    integer :: i, k
+    integer :: i
 
     do i = 1, size(candidates)
       associate (point => candidates(i)%point)
@@ -202,12 +202,8 @@ contains
         if (point%is_valid .and. point%excess() > 0) merit(i) = exceeded * (1.0_wp + point%excess())
       end associate
     end do
-    is_left = .true.
-    allocate (order(min(size(candidates), most_printed)))
-    do k = 1, size(order)
-      order(k) = minloc(merit, dim=1, mask=is_left)
-      is_left(order(k)) = .false.
-    end do
+    allocate (order, source=ascending_order(merit))
+    if (size(order) > most_printed) order = order(:most_printed)
   end subroutine rank_candidates
 
   !> optimise.csv: a row for each candidate.

@@ -161,15 +161,27 @@ contains
     call dlasrt('I', size(values), values, info)
   end subroutine sort_ascending
 
-  !> The order of numbers, as by `sort_ascending`; equal ones stay as they are.
+  !> The permutation that sorts numbers, by Shell's sort; equal ones stay in their order.
   pure function ascending_order(values) result(order)
     real(wp), intent(in) :: values(:)   !! of any unit
-    integer :: order(size(values))
-    integer :: i, rank
+    integer :: order(size(values))      !! `values(order)` is sorted
+    integer :: before, gap, i, k, this
 
-    do i = 1, size(values)
-      rank = 1 + count(values < values(i)) + count(abs(values(:i - 1) - values(i)) <= 0)
-      order(rank) = i
+    order = [(i, i=1, size(values))]
+    gap = size(values) / 2
+    do while (gap > 0)
+      do i = gap + 1, size(values)
+        this = order(i)
+        k = i
+        do while (k > gap)
+          before = order(k - gap)
+          if (values(before) < values(this) .or. (before < this .and. values(before) <= values(this))) exit
+          order(k) = before
+          k = k - gap
+        end do
+        order(k) = this
+      end do
+      gap = gap / 2
     end do
   end function ascending_order
 
