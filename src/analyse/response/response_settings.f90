@@ -15,7 +15,7 @@ module nocdyn_response_settings
   implicit none (type, external)
   private
 
-  public :: check_response, place_error, read_response_settings
+  public :: check_response, place_error, read_response_settings, sets_response_speed
 
   type, public :: response_settings_t
     integer :: group = 0                        !! &response in the input
@@ -53,7 +53,7 @@ contains
     end if
     settings%group = groups(1)
     associate (group => input%groups(groups(1)))
-      settings%axis%is_frequency = group%has_value('frequency')
+      settings%axis%is_frequency = .not. sets_response_speed(input)
       if (settings%axis%is_frequency) then
         call find_shaker(input, machine, settings, error)
         if (.not. allocated(error)) call refuse_speed_rules(input, error)
@@ -76,6 +76,16 @@ contains
     end associate
     if (settings%has_margin_rule) call load_rule(input, groups(1), 'margin_', settings%margin_rule, error)
   end subroutine read_response_settings
+
+  !> Whether responses are at speeds that they set, not at the frequencies of a shaker: so if &response does not say otherwise.
+  pure logical function sets_response_speed(input) result(sets_speed)
+    type(input_t), intent(in) :: input
+    integer, allocatable :: groups(:)
+
+    allocate (groups, source=input%groups_named('response'))
+    sets_speed = size(groups) == 0
+    if (.not. sets_speed) sets_speed = .not. input%groups(groups(1))%has_value('frequency')
+  end function sets_response_speed
 
   !> Finds the shaker: the harmonic excitation that &response names, or the only one.
   subroutine find_shaker(input, machine, settings, error)

@@ -13,6 +13,7 @@ module nocdyn_response_functionals
   use nocdyn_moment_forms, only: list_moment_forms, moment_form_t
   use nocdyn_number_changes, only: changed_machine_t, displacement_of, number_change_t
   use nocdyn_response_analysis, only: response_analysis_t
+  use nocdyn_response_settings, only: sets_response_speed
   use nocdyn_response_summary, only: critical_t
   use nocdyn_varied_keys, only: near_points
   implicit none (type, external)
@@ -66,13 +67,8 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
-    logical :: sets_speed
 
-    sets_speed = .true.
-    if (size(input%groups_named('response')) > 0) then
-      sets_speed = .not. input%groups(input%position('response'))%has_value('frequency')
-    end if
-    call assemble_steady_machine(input, .true., machine, error, sets_speed=sets_speed)
+    call assemble_steady_machine(input, .true., machine, error, sets_speed=sets_response_speed(input))
   end subroutine assemble_response_machine
 
   !> The form of the mode of a critical speed in a changed machine or state, and the frequency of its line.

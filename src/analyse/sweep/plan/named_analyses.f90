@@ -11,6 +11,7 @@ module nocdyn_named_analyses
   use nocdyn_modes_results, only: modes_results_t
   use nocdyn_orbit_results, only: orbit_results_t
   use nocdyn_response_results, only: response_results_t
+  use nocdyn_response_settings, only: sets_response_speed
   implicit none (type, external)
   private
 
@@ -50,12 +51,9 @@ contains
     type(input_t), intent(in) :: input
     type(machine_t), intent(out) :: machine
     type(error_t), allocatable, intent(out) :: error
-    integer, allocatable :: responses(:)
     logical :: sets_speed
 
-    sets_speed = analysis%sets_speed
-    allocate (responses, source=input%groups_named('response'))
-    if (size(responses) > 0) sets_speed = sets_speed .and. .not. input%groups(responses(1))%has_value('frequency')
+    sets_speed = analysis%sets_speed .and. sets_response_speed(input)
     if (.not. analysis%takes_joints) call refuse_joints(input, analysis%is_steady, 'nocdyn ' // word, error, &
                                                         sets_speed=sets_speed)
     if (allocated(error)) return
