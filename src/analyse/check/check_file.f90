@@ -12,6 +12,7 @@ module nocdyn_check_file
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: machine_notes, named_coordinates
   use nocdyn_reduced, only: new_reduced
+  use nocdyn_report_openings, only: open_analysis_report
   use nocdyn_rigid_trains, only: ratio_tolerance
   use nocdyn_shaft_segments, only: segment_inertia, segment_stiffness
   use nocdyn_shafts, only: shafts_t
@@ -38,8 +39,7 @@ contains
     do i = 1, size(machine%simplifications)
       call append(notes, machine%simplifications(i)%text)
     end do
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call json%put('degrees_of_freedom', machine%freedoms())
     call json%put('independent', selected(machine%names, named_coordinates(machine)))
     call json%put('notes', notes)

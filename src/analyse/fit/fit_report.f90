@@ -8,6 +8,7 @@ module nocdyn_fit_report
   use nocdyn_kinds, only: wp
   use nocdyn_least_squares, only: solution_t
   use nocdyn_output_file, only: output_file_t
+  use nocdyn_report_openings, only: append_notes, open_analysis_report
   use nocdyn_table_text, only: cell, padded
   use nocdyn_text, only: append, joined, quoted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -139,9 +140,7 @@ contains
     type(text_buffer_t) :: report
     integer :: i, width
 
-    do i = 1, size(self%notes)
-      call report%append_line(file // ': note: ' // self%notes(i)%text)
-    end do
+    call append_notes(report, file, self%notes)
     line = file // ': ' // to_text(size(self%unknowns)) // ' unknowns fitted to ' // to_text(size(self%solution%residuals)) // &
            ' values in ' // to_text(self%evaluations) // ' evaluations'
     if (self%starts > 1) line = line // ', best from start ' // to_text(self%best_start) // ' of ' // to_text(self%starts)
@@ -228,8 +227,7 @@ contains
     type(comparison_t) :: after, before   ! of damping ratios
     integer :: i
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call json%put('notes', self%notes)
     call json%put('values', size(self%solution%residuals))
     call json%put('evaluations', self%evaluations)

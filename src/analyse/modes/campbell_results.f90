@@ -12,6 +12,7 @@ module nocdyn_campbell_results
   use nocdyn_margins, only: add_coverage, add_critical, add_nearest, margin_text, mode_text, put_margin, put_mode, unknown_ratio
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
+  use nocdyn_report_openings, only: append_notes, open_analysis_report
   use nocdyn_table_text, only: cell, right
   use nocdyn_text, only: counted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -170,8 +171,7 @@ contains
     real(wp), allocatable :: unstable(:)
     integer :: i
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call verdict%put(json)
     call json%put('notes', self%notes)
     if (size(self%unstable) > 0) then
@@ -247,11 +247,9 @@ contains
     type(campbell_t), intent(in) :: self
     character(len=:), allocatable :: text
     type(text_buffer_t) :: report
-    integer :: i, last, m
+    integer :: last, m
 
-    do i = 1, size(self%notes)
-      call report%append_line(file // ': note: ' // self%notes(i)%text)
-    end do
+    call append_notes(report, file, self%notes)
     last = size(self%speed)
     call report%append_line(file // ': natural frequencies from ' // rpm(self%speed(1)) // ' to ' // rpm(self%speed(last)) // &
                             ' rpm of ' // body // ', ' // counted(size(self%order), 'order', 'orders'))

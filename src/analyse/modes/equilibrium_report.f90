@@ -16,6 +16,7 @@ module nocdyn_equilibrium_report
   use nocdyn_power_notes, only: note_power_signs
   use nocdyn_quantities, only: form_angle
   use nocdyn_reduced, only: new_reduced, reduced_t
+  use nocdyn_report_openings, only: append_notes, open_analysis_report
   use nocdyn_signals, only: signal_angle, signal_element, signal_residual, signal_t, signal_time, signal_work_in, &
     signal_work_out
   use nocdyn_table_text, only: append_table, cell, cell_digits, clear_rounding, padded, rounding
@@ -135,11 +136,9 @@ contains
     character(len=:), allocatable :: heading
     type(text_buffer_t) :: report
     real(wp), allocatable :: values(:, :)   ! of one steady state
-    integer :: i, k
+    integer :: k
 
-    do i = 1, size(self%notes)
-      call report%append_line(file // ': note: ' // self%notes(i)%text)
-    end do
+    call append_notes(report, file, self%notes)
     do k = 1, size(self%equilibria)
       heading = file // ': steady state'
       if (size(self%equilibria) > 1) heading = heading // ' ' // to_text(k) // ' of ' // to_text(size(self%equilibria))
@@ -202,8 +201,7 @@ contains
     type(equilibrium_report_t), intent(in) :: self
     integer :: k
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call json%put('independent', self%coordinates)
     call json%put('notes', self%notes)
     call json%open_list('columns')

@@ -10,6 +10,7 @@ module nocdyn_modes_files
   use nocdyn_modes_report, only: modes_report_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_printable, only: as_utf_8
+  use nocdyn_report_openings, only: open_analysis_report
   use nocdyn_shaft_errors, only: noted_error
   use nocdyn_text, only: string_t, to_text
   implicit none (type, external)
@@ -91,8 +92,7 @@ contains
     type(comparison_t), intent(in) :: comparisons(:)   !! with measured frequencies
     integer :: i
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call json%put('about', self%point)
     if (self%t < t_infinity) call json%put('time_s', self%t)
     call json%put('notes', self%notes)

@@ -9,6 +9,7 @@ module nocdyn_modes_report
   use nocdyn_machine_modes, only: find_machine_modes
   use nocdyn_modes, only: kind_names, mode_diverging, mode_internal, mode_oscillating, mode_overdamped, mode_rigid, &
     mode_t
+  use nocdyn_report_openings, only: append_notes
   use nocdyn_shaft_errors, only: describe_error, has_shaft_nodes, noted_error, shaft_error
   use nocdyn_operating_point, only: operating_point_t
   use nocdyn_damping_notes, only: note_mean_slopes, note_stand_ins
@@ -156,9 +157,7 @@ contains
     integer :: b, first, i, last, width
     integer, allocatable :: chosen(:)
 
-    do i = 1, size(self%notes)
-      call report%append_line(file // ': note: ' // self%notes(i)%text)
-    end do
+    call append_notes(report, file, self%notes)
     call report%append_line(file // ': modes about ' // self%point)
     call put_oscillations(self, any(wanted == unit_rpm), report)
     call put_real(self, mode_rigid, report)

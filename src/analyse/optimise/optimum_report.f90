@@ -8,6 +8,7 @@ module nocdyn_optimum_report
   use nocdyn_minimax, only: kept
   use nocdyn_optimum_search, only: candidate_t, optimum_t
   use nocdyn_output_file, only: output_file_t
+  use nocdyn_report_openings, only: append_notes, open_analysis_report
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: append, counted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -79,9 +80,7 @@ contains
     type(text_buffer_t) :: report
     integer :: i, width
 
-    do i = 1, size(self%notes)
-      call report%append_line(file // ': note: ' // self%notes(i)%text)
-    end do
+    call append_notes(report, file, self%notes)
     line = file // ': best of ' // counted(self%evaluations, 'machine', 'machines')
     if (size(self%candidates) > 1) line = line // ' in ' // to_text(size(self%candidates)) // ' combinations'
     call report%append_line(line)
@@ -266,8 +265,7 @@ contains
     type(optimum_t), intent(in) :: self
     integer :: i
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call json%put('notes', self%notes)
     call json%put('evaluations', self%evaluations)
     call json%put('combinations', size(self%candidates))

@@ -10,6 +10,7 @@ module nocdyn_response_files
   use nocdyn_kinds, only: wp
   use nocdyn_margins, only: put_margin, put_mode
   use nocdyn_output_file, only: output_file_t
+  use nocdyn_report_openings, only: open_analysis_report
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_axes, only: response_axis_t
   use nocdyn_response_limits, only: no_limit, response_limit_t
@@ -330,8 +331,7 @@ contains
     integer :: i
 
     axis = analysis%settings%axis
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call verdict%put(json)
     call json%put('wall_time_s', analysis%wall_time)
     call json%put('notes', analysis%notes)

@@ -4,6 +4,7 @@ module nocdyn_response_report
   use nocdyn_comparisons, only: write_comparisons
   use nocdyn_kinds, only: wp
   use nocdyn_margins, only: margin_text, mode_text
+  use nocdyn_report_openings, only: append_notes
   use nocdyn_response_analysis, only: response_analysis_t
   use nocdyn_response_points, only: response_point_t
   use nocdyn_response_summary, only: critical_t, response_summary_t
@@ -29,11 +30,8 @@ contains
     character(len=:), allocatable :: text
     character(len=:), allocatable :: range
     type(text_buffer_t) :: report
-    integer :: i
 
-    do i = 1, size(analysis%notes)
-      call report%append_line(file // ': note: ' // analysis%notes(i)%text)
-    end do
+    call append_notes(report, file, analysis%notes)
     associate (speeds => analysis%settings%speeds)
       range = 'at ' // shown(analysis, speeds(1))
       if (size(speeds) > 1) range = 'from ' // shown(analysis, speeds(1)) // ' to ' // shown(analysis, speeds(size(speeds)))

@@ -12,6 +12,7 @@ module nocdyn_run_summary
   use nocdyn_kinds, only: wp
   use nocdyn_machine, only: machine_t
   use nocdyn_machine_report, only: constraint_count, machine_notes, named_coordinates
+  use nocdyn_report_openings, only: open_analysis_report
   use nocdyn_run_fatigue, only: run_fatigue_t
   use nocdyn_solver_status, only: max_switch_times, solver_status_t
   use nocdyn_run_settings, only: put_settings
@@ -156,8 +157,7 @@ contains
     character(len=:), allocatable :: text
     type(json_t) :: json
 
-    call json%open_report(input%file, input%title(), summary%status, summary%message)
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input, summary%status, summary%message)
     call summary%verdict%put(json)
     call json%open('machine')
     call json%put('bodies', summary%bodies)

@@ -7,6 +7,7 @@ module nocdyn_sensitivity_report
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: ascending_order
   use nocdyn_output_file, only: output_file_t
+  use nocdyn_report_openings, only: append_notes, open_analysis_report
   use nocdyn_text, only: rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   use nocdyn_varied_keys, only: varied_key_t
@@ -64,9 +65,7 @@ contains
     integer :: i, k
     real(wp) :: effect(size(self%keys))
 
-    do i = 1, size(self%notes)
-      call report%append_line(file // ': note: ' // self%notes(i)%text)
-    end do
+    call append_notes(report, file, self%notes)
     call report%append_line(file // ': derivatives by ' // to_text(size(self%keys)) // ' numbers; what one per cent more of ' // &
                             'each does, of angles one degree')
     do i = 1, min(size(self%answers), most_answers)
@@ -157,8 +156,7 @@ contains
     type(sensitivity_t), intent(in) :: self
     integer :: i
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call json%put('notes', self%notes)
     call json%open_list('numbers')
     do i = 1, size(self%keys)

@@ -8,6 +8,7 @@ module nocdyn_transit_report
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
   use nocdyn_output_units, only: output_units
+  use nocdyn_report_openings, only: append_notes, open_analysis_report
   use nocdyn_response_limits, only: no_limit
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: append, counted, quoted, rounded_text, string_t, to_text
@@ -33,8 +34,7 @@ contains
     type(verdict_t), intent(in) :: verdict
     integer :: k
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call verdict%put(json)
     call json%put('body', analysis%body_name)
     call json%put('turns_of_mean', analysis%settings%turns)
@@ -180,9 +180,7 @@ contains
     type(text_buffer_t) :: report
     integer :: i
 
-    do i = 1, size(analysis%notes)
-      call report%append_line(input%shown_case() // ': note: ' // analysis%notes(i)%text)
-    end do
+    call append_notes(report, input%shown_case(), analysis%notes)
     text = input%shown_case() // ': ' // counted(size(analysis%passages), 'passage', 'passages') // ' of '
     do i = 1, size(analysis%settings%ranges)
       if (i > 1) text = text // ', '

@@ -7,6 +7,7 @@ module nocdyn_orbit_report
   use nocdyn_orbit_parts, only: find_parts, part_t
   use nocdyn_orbit_problem, only: hopf, orbit_point_t
   use nocdyn_orbit_tables, only: most_multipliers
+  use nocdyn_report_openings, only: open_analysis_report
   use nocdyn_text, only: to_text
   use nocdyn_verdicts, only: verdict_t
   implicit none (type, external)
@@ -27,8 +28,7 @@ contains
     type(part_t), allocatable :: parts(:)
     integer :: i
 
-    call json%open_report(input%file, input%title())
-    if (allocated(input%load_case)) call json%put('load_case', input%load_case%name)
+    call open_analysis_report(json, input)
     call verdict%put(json)
     call json%put('parameter', analysis%parameter)
     call json%put('unit', analysis%unit)

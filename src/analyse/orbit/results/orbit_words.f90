@@ -9,6 +9,7 @@ module nocdyn_orbit_words
   use nocdyn_orbit_problem, only: branch_point, doubling, fold, hopf, neimark_sacker, torque_fold
   use nocdyn_orbit_problem, only: orbit_point_t
   use nocdyn_quantities, only: rank_moment
+  use nocdyn_report_openings, only: append_notes
   use nocdyn_table_text, only: cell, padded, text_width
   use nocdyn_text, only: counted, quoted, rounded_text, to_text
   use nocdyn_text_buffer, only: text_buffer_t
@@ -34,9 +35,7 @@ contains
     type(text_buffer_t) :: report
     integer :: i
 
-    do i = 1, size(analysis%notes)
-      call report%append_line(input%shown_case() // ': note: ' // analysis%notes(i)%text)
-    end do
+    call append_notes(report, input%shown_case(), analysis%notes)
     associate (points => analysis%branch%points(:analysis%branch%count))
       text = counted(size(points), 'periodic motion', 'periodic motions')
       if (analysis%is_self_excited) text = counted(size(points), 'steady state or limit cycle', 'steady states and limit cycles')
