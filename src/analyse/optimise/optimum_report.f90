@@ -1,5 +1,6 @@
 !> Reports on the best choice: what is printed, optimise.csv with all candidates, and optimise.json.
 module nocdyn_optimum_report
+  use nocdyn_column_names, only: with_unit
   use nocdyn_csv, only: text_cell
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -248,15 +249,6 @@ contains
       end associate
     end do
   end subroutine optimum_csv
-
-  !> "coupling.rubber.stiffness [N m/rad]".
-  pure function with_unit(name, unit) result(text)
-    character(len=*), intent(in) :: name, unit
-    character(len=:), allocatable :: text
-
-    text = name
-    if (unit /= '') text = name // ' [' // unit // ']'
-  end function with_unit
 
   !> The members of optimise.json.
   subroutine put_optimum(json, input, self)
