@@ -105,6 +105,8 @@ def peak_of(moment):
 def test_a_passage_with_constant_acceleration_is_the_closed_solution(nocdyn):
     report, _ = passed(nocdyn, train(more=TRANSIT + FINE_RUN))
     (passage,) = report["passages"]
+    heading = (nocdyn.folder / "out/transit.csv").read_bytes().partition(b"\n")[0]
+    assert heading == b"passage,t [s],mean_omega_a [rad/s],omega_a [rad/s],total_moment_shaft [N m]"
     table = nocdyn.values(name="transit.csv")
     peak = peak_of(closed_moment(np.linspace(0, T_END, 40001)))
     assert peak_of(table["total_moment_shaft"] - closed_moment(table["t"])) < EXACT * peak

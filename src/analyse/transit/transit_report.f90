@@ -154,8 +154,9 @@ contains
     speed = unit_for('rad/s', output_units(input))
     unit = 'rad/s'
     if (speed > 0) unit = trim(units(speed)%name)
-    labels = [string_t('passage'), string_t('t [s]'), string_t(with_unit('mean_' // analysis%names(2)%text, unit)), &
-              string_t(with_unit(analysis%names(2)%text, unit))]
+    labels = [string_t('passage'), string_t('t [s]')]
+    call append(labels, with_unit('mean_' // analysis%names(2)%text, unit))
+    call append(labels, with_unit(analysis%names(2)%text, unit))
     do i = 3, size(analysis%names)
       do q = 1, size(analysis%quantities)
         if (analysis%quantities(q)%name == analysis%names(i)%text) exit
