@@ -1,7 +1,7 @@
 !> The measurements of an input, &measurement, in SI units: what was measured, where, and how exactly.
 module nocdyn_measurements
   use nocdyn_errors, only: error_t
-  use nocdyn_input, only: diagnostics_t, input_t
+  use nocdyn_input, only: diagnostics_t, group_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_measured_signals, only: drives_only, find_measured_signal
   use nocdyn_order_tracking, only: track_order, turning_t
@@ -112,7 +112,7 @@ contains
       self%name = group%name
       self%deviation = group%number('deviation', absent=0.0_wp)
       if (kind == measured_frequency) then
-        call read_frequencies()
+        call read_frequencies(input, g, self, diagnostics)
         return
       end if
       call find_measured_signal(input, g, signals, self%signal, conversion, diagnostics)
@@ -127,120 +127,153 @@ contains
       end if
       self%values = conversion%convert(group%number('scale') * group%numbers('values') + group%number('offset'))
       self%deviation = abs(conversion%convert(self%deviation) - conversion%convert(0.0_wp))
-      select case (kind)
-      case (measured_series)
-        call read_series()
-      case (measured_order)
-        call read_order()
-      case default
-        call read_peak()
-      end select
     end associate
-
-  contains
-
-    subroutine read_series()
-      associate (group => input%groups(g))
-        self%abscissa = group%numbers('times')
-        if (group%has_value('gaps')) self%gaps = group%whole_number('gaps')
-        self%delay = group%number('delay')
-        self%finds_delay = group%text('alignment') /= 'given'
-        self%drifts = group%text('alignment') == 'drifting'
-        self%largest_drift = group%number('largest_drift', absent=0.05_wp)
-        self%drift_interval = group%number('drift_interval', absent=1.0_wp)
-        if (2 * self%largest_drift >= self%drift_interval) then
-          call input%report(g, 'largest_drift', 'largest_drift must be less than half of drift_interval, ' // &
-                            to_text(self%drift_interval) // ' s', diagnostics)
-        end if
-        self%largest_shift = group%number('largest_shift', &
-                                          absent=0.1_wp * (self%abscissa(size(self%abscissa)) - self%abscissa(1)))
-        self%from = group%number('from', absent=self%from)
-        self%until = group%number('until', absent=self%until)
-        if (.not. group%has_value('frequency_band')) return
-        self%band = group%numbers('frequency_band')
-        if (self%band(2) > self%band(1)) return
-        call input%report(g, 'frequency_band', 'frequency_band: the second frequency must be greater than the first', diagnostics)
-      end associate
-    end subroutine read_series
-
-    !> Amplitudes over speeds, given or found from a record over the time.
-    subroutine read_order()
-      type(turning_t) :: turning
-      real(wp), allocatable :: amplitudes(:), range(:), speeds(:)
-      character(len=:), allocatable :: message
-
-      associate (group => input%groups(g))
-        self%order = group%number('order')
-        if (group%has_value('gaps')) self%gaps = group%whole_number('gaps')
-        if (group%has_value('times')) then
-          if (.not. (group%has_value('speeds') .or. group%has_value('pulses'))) then
-            call input%report(g, 'name', 'speeds or pulses is missing beside times; needed to find the turns', diagnostics)
-            return
-          end if
-          if (group%has_value('pulses') .and. .not. group%has_value('pulses_per_turn')) then
-            call input%report(g, 'name', 'pulses_per_turn is missing beside pulses', diagnostics)
-            return
-          end if
-          turning%speeds = group%numbers('speeds')
-          turning%pulses = group%numbers('pulses')
-          turning%pulses_per_turn = group%number('pulses_per_turn', absent=1.0_wp)
-          call track_order(group%numbers('times'), turning, self%values, self%order, group%whole_number('turns'), speeds, &
-                           amplitudes, message)
-          if (message /= '') then
-            call input%report(g, 'name', message, diagnostics)
-            return
-          end if
-          call move_alloc(amplitudes, self%values)
-          call move_alloc(speeds, self%abscissa)
-        else if (group%has_value('speeds')) then
-          self%abscissa = group%numbers('speeds')
-        else
-          call input%report(g, 'name', 'speeds is missing; needed: one for each amplitude', diagnostics)
-          return
-        end if
-        if (.not. group%has_value('speed_range')) return
-        range = group%numbers('speed_range')
-        self%from = minval(range)
-        self%until = maxval(range)
-      end associate
-    end subroutine read_order
-
-    subroutine read_peak()
-      associate (group => input%groups(g))
-        allocate (self%abscissa(0))
-        self%statistic = findloc(peak_names == group%text('statistic'), .true., dim=1)
-        self%speed = group%number('speed', absent=0.0_wp)
-        self%from = group%number('from', absent=self%from)
-        if (size(self%values) /= 1) call input%report(g, 'values', 'values: ' // to_text(size(self%values)) // &
-                                                      ' numbers; needed: one, the peak', diagnostics)
-      end associate
-    end subroutine read_peak
-
-    subroutine read_frequencies()
-      associate (group => input%groups(g))
-        self%signal_name = ''
-        self%unit = 'rad/s'
-        self%caption = 'natural frequency'
-        allocate (self%abscissa(0))
-        self%values = group%numbers('frequency')
-        self%damping = group%numbers('relative_damping')
-        self%damping_deviation = group%number('damping_deviation', absent=0.0_wp)
-        self%modes = group%whole_numbers('modes')
-        call check_count('relative_damping', size(self%damping))
-        call check_count('modes', size(self%modes))
-      end associate
-    end subroutine read_frequencies
-
-    !> One for each frequency, or none.
-    subroutine check_count(key, count)
-      character(len=*), intent(in) :: key
-      integer, intent(in) :: count
-
-      if (count == 0 .or. count == size(self%values)) return
-      call input%report(g, key, key // ' has ' // to_text(count) // ' values and frequency has ' // &
-                        to_text(size(self%values)) // '; needed: as many of each', diagnostics)
-    end subroutine check_count
-
+    select case (kind)
+    case (measured_series)
+      call read_series(input, g, self, diagnostics)
+    case (measured_order)
+      call read_order(input, g, self, diagnostics)
+    case default
+      call read_peak(input, g, self, diagnostics)
+    end select
   end subroutine read_one
+
+  !> Times, clock and band of values over the time.
+  subroutine read_series(input, g, self, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: g
+    type(measurement_t), intent(inout) :: self   !! with its values
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    associate (group => input%groups(g))
+      self%abscissa = group%numbers('times')
+      if (group%has_value('gaps')) self%gaps = group%whole_number('gaps')
+      self%delay = group%number('delay')
+      self%finds_delay = group%text('alignment') /= 'given'
+      self%drifts = group%text('alignment') == 'drifting'
+      self%largest_drift = group%number('largest_drift', absent=0.05_wp)
+      self%drift_interval = group%number('drift_interval', absent=1.0_wp)
+      if (2 * self%largest_drift >= self%drift_interval) then
+        call input%report(g, 'largest_drift', 'largest_drift must be less than half of drift_interval, ' // &
+                          to_text(self%drift_interval) // ' s', diagnostics)
+      end if
+      self%largest_shift = group%number('largest_shift', &
+                                        absent=0.1_wp * (self%abscissa(size(self%abscissa)) - self%abscissa(1)))
+      self%from = group%number('from', absent=self%from)
+      self%until = group%number('until', absent=self%until)
+      if (.not. group%has_value('frequency_band')) return
+      self%band = group%numbers('frequency_band')
+      if (self%band(2) > self%band(1)) return
+      call input%report(g, 'frequency_band', 'frequency_band: the second frequency must be greater than the first', diagnostics)
+    end associate
+  end subroutine read_series
+
+  !> Amplitudes over speeds, given or found from a record over the time.
+  subroutine read_order(input, g, self, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: g
+    type(measurement_t), intent(inout) :: self   !! with its values
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message
+    real(wp), allocatable :: range(:)
+
+    associate (group => input%groups(g))
+      self%order = group%number('order')
+      if (group%has_value('gaps')) self%gaps = group%whole_number('gaps')
+      message = ''
+      if (group%has_value('times')) then
+        call track_record(group, self, message)
+      else if (group%has_value('speeds')) then
+        self%abscissa = group%numbers('speeds')
+      else
+        message = 'speeds is missing; needed: one for each amplitude'
+      end if
+      if (message /= '') then
+        call input%report(g, 'name', message, diagnostics)
+        return
+      end if
+      if (.not. group%has_value('speed_range')) return
+      range = group%numbers('speed_range')
+      self%from = minval(range)
+      self%until = maxval(range)
+    end associate
+  end subroutine read_order
+
+  !> Replaces the values of a record over the time by the amplitudes of the order over the speed.
+  subroutine track_record(group, self, message)
+    type(group_t), intent(in) :: group
+    type(measurement_t), intent(inout) :: self   !! with its values and its order
+    character(len=:), allocatable, intent(out) :: message   !! '' if nothing is wrong
+    type(turning_t) :: turning
+    real(wp), allocatable :: amplitudes(:), speeds(:)
+
+    if (.not. (group%has_value('speeds') .or. group%has_value('pulses'))) then
+      message = 'speeds or pulses is missing beside times; needed to find the turns'
+      return
+    end if
+    if (group%has_value('pulses') .and. .not. group%has_value('pulses_per_turn')) then
+      message = 'pulses_per_turn is missing beside pulses'
+      return
+    end if
+    turning%speeds = group%numbers('speeds')
+    turning%pulses = group%numbers('pulses')
+    turning%pulses_per_turn = group%number('pulses_per_turn', absent=1.0_wp)
+    call track_order(group%numbers('times'), turning, self%values, self%order, group%whole_number('turns'), speeds, &
+                     amplitudes, message)
+    if (message /= '') return
+    call move_alloc(amplitudes, self%values)
+    call move_alloc(speeds, self%abscissa)
+  end subroutine track_record
+
+  !> What a peak is of, and where.
+  subroutine read_peak(input, g, self, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: g
+    type(measurement_t), intent(inout) :: self   !! with its values
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    allocate (self%abscissa(0))
+    associate (group => input%groups(g))
+      self%statistic = findloc(peak_names == group%text('statistic'), .true., dim=1)
+      self%speed = group%number('speed', absent=0.0_wp)
+      self%from = group%number('from', absent=self%from)
+    end associate
+    if (size(self%values) /= 1) call input%report(g, 'values', 'values: ' // to_text(size(self%values)) // &
+                                                  ' numbers; needed: one, the peak', diagnostics)
+  end subroutine read_peak
+
+  !> Natural frequencies with their damping ratios and the numbers of their modes.
+  subroutine read_frequencies(input, g, self, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: g
+    type(measurement_t), intent(inout) :: self
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    self%signal_name = ''
+    self%unit = 'rad/s'
+    self%caption = 'natural frequency'
+    allocate (self%abscissa(0))
+    associate (group => input%groups(g))
+      self%values = group%numbers('frequency')
+      self%damping = group%numbers('relative_damping')
+      self%damping_deviation = group%number('damping_deviation', absent=0.0_wp)
+      self%modes = group%whole_numbers('modes')
+    end associate
+    call check_count(input, g, 'relative_damping', size(self%damping), size(self%values), diagnostics)
+    call check_count(input, g, 'modes', size(self%modes), size(self%values), diagnostics)
+  end subroutine read_frequencies
+
+  !> Refuses a list that has some values, but not one for each frequency.
+  subroutine check_count(input, g, key, count, frequencies, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: g
+    character(len=*), intent(in) :: key
+    integer, intent(in) :: count, frequencies   !! numbers of values
+    type(diagnostics_t), intent(inout) :: diagnostics
+
+    if (count == 0 .or. count == frequencies) return
+    call input%report(g, key, key // ' has ' // to_text(count) // ' values and frequency has ' // to_text(frequencies) // &
+                      '; needed: as many of each', diagnostics)
+  end subroutine check_count
 
 end module nocdyn_measurements
