@@ -32,6 +32,17 @@ module nocdyn_record_reader
     wanted_column_t('values', 'column', 'unit', '')]
   integer, parameter :: time = 1, speed = 2, pulse = 3, value = 4   ! indices of `wanted`
 
+  !> A record on its way into a group.
+  type :: record_t
+    integer :: index                             !! of the group, among all of the file
+    character(len=:), allocatable :: path        !! of the record
+    type(value_t) :: source                      !! of the key `file`
+    type(data_table_t) :: table
+    integer :: columns(size(wanted)) = 0         !! of the table; 0: not wanted
+  contains
+    procedure :: check_rows, find_column, find_columns, find_unit, report, take_columns
+  end type record_t
+
 contains
 
   !> Replaces the file of a record by lists. The unit of the values stays, or is the one of their heading.
@@ -40,172 +51,201 @@ contains
     type(raw_group_t), intent(in) :: raw
     type(group_t), intent(inout) :: group
     type(diagnostics_t), intent(inout) :: diagnostics
-    type(data_table_t) :: table
+    type(record_t) :: record
     type(error_t), allocatable :: error
-    type(value_t) :: source
-    character(len=:), allocatable :: path, text
-    integer :: columns(size(wanted)), errors
+    character(len=:), allocatable :: text
+    integer :: errors, i
 
     if (.not. group%has_value('file')) return
-    source = group%values(group%key_position('file'))
+    record%index = raw%index
+    record%source = group%values(group%key_position('file'))
+    record%path = path_in(folder, record%source%texts(1)%text)
     group%values(group%key_position('file')) = value_t()
-    path = path_in(folder, source%texts(1)%text)
     errors = diagnostics%count
-    call read_text_file(path, text, error)
+    call read_text_file(record%path, text, error)
     if (allocated(error)) then
-      call report('file', error%message, exit_file)
+      call record%report(group, 'file', error%message, diagnostics, exit_file)
     else if (index(text, achar(0)) > 0) then
-      call report('file', shown_path(path) // ': not a text file', exit_input)
+      call record%report(group, 'file', shown_path(record%path) // ': not a text file', diagnostics)
     else
-      call read_data_table(text, headings_after_preamble, 0, table)
-      call find_columns()
-      if (diagnostics%count == errors) call take_columns()
+      call read_data_table(text, headings_after_preamble, 0, record%table)
+      call record%find_columns(group, diagnostics)
+      if (diagnostics%count == errors) call record%take_columns(group, diagnostics)
     end if
-    if (diagnostics%count > errors) call mark_lists()
-
-  contains
-
-    !> Adds a message on a key.
-    subroutine report(key, message, code)
-      character(len=*), intent(in) :: key, message
-      integer, intent(in) :: code
-
-      associate (place => group%values(group%key_position(key)))
-        if (place%is_given) then
-          call diagnostics%add(place%line, raw%index, key // ': ' // message, place%override, code)
-        else
-          call diagnostics%add(source%line, raw%index, key // ': ' // message, source%override, code)
-        end if
-      end associate
-    end subroutine report
-
-    !> Finds the columns; 0: not wanted.
-    subroutine find_columns()
-      logical :: has_times
-
-      columns = 0
-      has_times = group%text('kind') == 'series' .or. group%has_value('time_column') .or. group%has_value('pulse_column')
-      if (has_times) call find(time, 1)
-      if (group%text('kind') == 'order' .and. .not. group%has_value('pulse_column')) call find(speed, merge(2, 1, has_times))
-      if (group%has_value('pulse_column')) call find(pulse, 2)
-      call find(value, 1 + maxval(columns))
-    end subroutine find_columns
-
-    !> Finds one column.
-    subroutine find(item, absent)
-      integer, intent(in) :: item     !! of `wanted`
-      integer, intent(in) :: absent   !! the column if none is named
-      character(len=:), allocatable :: key, name
-
-      key = trim(wanted(item)%key)
-      columns(item) = absent
-      name = ''
-      if (group%has_value(key)) then
-        name = group%text(key)
-        columns(item) = table%find_column(name)
-      end if
-      if (columns(item) > 0 .and. columns(item) <= table%columns) return
-      if (name == '') then
-        call report('file', shown_path(path) // ' has ' // to_text(table%columns) // ' columns; needed: ' // &
-                    to_text(absent) // ' at least, or ' // key, exit_input)
-      else if (table%heading_line == 0) then
-        call report(key, 'there is no column ' // quoted(shortened(name)) // ' in ' // shown_path(path) // &
-                    ', which has no headings; allowed: numbers from 1 to ' // to_text(table%columns), exit_input)
-      else
-        call report(key, 'there is no single column ' // quoted(shortened(name)) // ' in ' // shown_path(path) // ':' // &
-                    to_text(table%heading_line) // '; allowed: ' // joined(table%headings, ', ') // ', or a number' // &
-                    near_match(name, table%headings), exit_input)
-      end if
-      columns(item) = 1   ! it is reported
-    end subroutine find
-
-    !> Takes the columns that were found.
-    subroutine take_columns()
-      type(line_messages_t) :: problems
-      type(string_t), allocatable :: messages(:)
-      type(unit_conversion_t) :: conversion
-      real(wp), allocatable :: numbers(:, :)   ! [rows, columns]
-      integer, allocatable :: items(:), rows(:)
-      integer :: c, i, k
-      integer, allocatable :: gaps(:)
-
-      allocate (items, source=pack([(i, i=1, size(wanted))], columns > 0))
-      allocate (gaps(size(items)))
-      problems%file = path
-      call table%read_columns(columns(items), numbers, gaps, problems)
-      allocate (rows, source=pack([(i, i=1, table%rows)], [(.not. any(ieee_is_nan(numbers(i, :))), i=1, table%rows)]))
-      do c = 1, size(items)
-        call find_unit(wanted(items(c)), columns(items(c)), conversion)
-        if (wanted(items(c))%si /= '') numbers(:, c) = conversion%convert(numbers(:, c))
-      end do
-      if (problems%errors == 0) call check_numbers(table, columns(items), rows, numbers, items(1) == time, problems)
-      if (problems%errors == 0 .and. size(rows) < 2) call problems%add(0, to_text(size(rows)) // &
-                                                                       ' rows without gaps; needed: 2 at least')
-      call problems%close(messages)
-      do i = 1, size(messages)
-        call report('file', messages(i)%text, exit_input)
-      end do
-      if (diagnostics%count > errors) return
-      do c = 1, size(items)
-        associate (list => group%values(group%key_position(trim(wanted(items(c))%list))))
-          list = value_t(source%is_given, source%line, source%override)
-          allocate (list%numbers(size(rows)))
-          do k = 1, size(rows)
-            list%numbers(k) = numbers(rows(k), c)
-          end do
-        end associate
-      end do
-      if (size(rows) < table%rows) then
-        group%values(group%key_position('gaps')) = value_t(source%is_given, source%line, source%override)
-        group%values(group%key_position('gaps'))%whole_numbers = [table%rows - size(rows)]
-      end if
-      do i = 1, size(wanted)   ! they are of no use without the file
-        group%values(group%key_position(trim(wanted(i)%key))) = value_t()
-        if (wanted(i)%unit /= '' .and. wanted(i)%unit /= 'unit') then
-          group%values(group%key_position(trim(wanted(i)%unit))) = value_t()
-        end if
-      end do
-    end subroutine take_columns
-
-    !> The unit of a column: of its key, else of its heading. The one of values, which the machine decides on, is kept.
-    subroutine find_unit(item, column, conversion)
-      type(wanted_column_t), intent(in) :: item
-      integer, intent(in) :: column
-      type(unit_conversion_t), intent(out) :: conversion
-      character(len=:), allocatable :: message, name, unit
-
-      if (item%unit == '') return
-      call split_unit(table%headings(column)%text, name, unit)
-      associate (given => group%values(group%key_position(trim(item%unit))))
-        if (given%has_any()) unit = given%texts(1)%text
-        if (item%si == '') then
-          if (given%has_any() .or. unit == '') return
-          given = value_t(source%is_given, source%line, source%override)
-          allocate (given%texts(0))
-          call append(given%texts, unit)
-        else if (unit /= '') then
-          call find_conversion(unit, trim(item%si), conversion, message)
-          if (message == '') return
-          message = message // '; column ' // to_text(column) // ' of ' // shown_path(path)
-          call report(trim(merge(item%unit, 'file      ', given%has_any())), message, exit_input)
-        end if
-      end associate
-    end subroutine find_unit
-
-    !> Values that are wrong are not looked at.
-    subroutine mark_lists()
-      integer :: i
-
-      do i = 1, size(wanted)
-        group%values(group%key_position(trim(wanted(i)%list))) = value_t(source%is_given, source%line, source%override)
-      end do
-    end subroutine mark_lists
-
+    if (diagnostics%count == errors) return
+    do i = 1, size(wanted)   ! values that are wrong are not looked at
+      group%values(group%key_position(trim(wanted(i)%list))) = empty_value(record%source)
+    end do
   end subroutine read_record
 
-  !> Refuses numbers beyond the range of an input, and times that do not ascend.
-  subroutine check_numbers(table, columns, rows, numbers, has_times, problems)
-    type(data_table_t), intent(in) :: table
+  !> Adds a message on a key.
+  subroutine report(self, group, key, message, diagnostics, code)
+    class(record_t), intent(in) :: self
+    type(group_t), intent(in) :: group
+    character(len=*), intent(in) :: key, message
+    type(diagnostics_t), intent(inout) :: diagnostics
+    integer, intent(in), optional :: code   !! of the program's exit; absent: `exit_input`
+    integer :: exit_code
+
+    exit_code = exit_input
+    if (present(code)) exit_code = code
+    associate (place => group%values(group%key_position(key)))
+      if (place%is_given) then
+        call diagnostics%add(place%line, self%index, key // ': ' // message, place%override, exit_code)
+      else
+        call diagnostics%add(self%source%line, self%index, key // ': ' // message, self%source%override, exit_code)
+      end if
+    end associate
+  end subroutine report
+
+  !> A value at the place of another one.
+  pure function empty_value(place) result(value)
+    type(value_t), intent(in) :: place
+    type(value_t) :: value
+
+    value = value_t(place%is_given, place%line, place%override)
+  end function empty_value
+
+  !> Finds the columns that the kind of measurement and the keys want.
+  subroutine find_columns(self, group, diagnostics)
+    class(record_t), intent(inout) :: self
+    type(group_t), intent(in) :: group
+    type(diagnostics_t), intent(inout) :: diagnostics
+    logical :: has_times
+
+    has_times = group%text('kind') == 'series' .or. group%has_value('time_column') .or. group%has_value('pulse_column')
+    if (has_times) call self%find_column(group, time, 1, diagnostics)
+    if (group%text('kind') == 'order' .and. .not. group%has_value('pulse_column')) then
+      call self%find_column(group, speed, merge(2, 1, has_times), diagnostics)
+    end if
+    if (group%has_value('pulse_column')) call self%find_column(group, pulse, 2, diagnostics)
+    call self%find_column(group, value, 1 + maxval(self%columns), diagnostics)
+  end subroutine find_columns
+
+  !> Finds one column.
+  subroutine find_column(self, group, item, absent, diagnostics)
+    class(record_t), intent(inout) :: self
+    type(group_t), intent(in) :: group
+    integer, intent(in) :: item     !! of `wanted`
+    integer, intent(in) :: absent   !! the column if none is named
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: file, key, name
+
+    key = trim(wanted(item)%key)
+    self%columns(item) = absent
+    name = ''
+    if (group%has_value(key)) then
+      name = group%text(key)
+      self%columns(item) = self%table%find_column(name)
+    end if
+    if (self%columns(item) > 0 .and. self%columns(item) <= self%table%columns) return
+    file = shown_path(self%path)
+    if (name == '') then
+      call self%report(group, 'file', file // ' has ' // to_text(self%table%columns) // ' columns; needed: ' // &
+                       to_text(absent) // ' at least, or ' // key, diagnostics)
+    else if (self%table%heading_line == 0) then
+      call self%report(group, key, 'there is no column ' // quoted(shortened(name)) // ' in ' // file // &
+                       ', which has no headings; allowed: numbers from 1 to ' // to_text(self%table%columns), diagnostics)
+    else
+      call self%report(group, key, 'there is no single column ' // quoted(shortened(name)) // ' in ' // file // ':' // &
+                       to_text(self%table%heading_line) // '; allowed: ' // joined(self%table%headings, ', ') // &
+                       ', or a number' // near_match(name, self%table%headings), diagnostics)
+    end if
+    self%columns(item) = 1   ! it is reported
+  end subroutine find_column
+
+  !> Takes the columns that were found, in SI.
+  subroutine take_columns(self, group, diagnostics)
+    class(record_t), intent(in) :: self
+    type(group_t), intent(inout) :: group
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(line_messages_t) :: problems
+    type(string_t), allocatable :: messages(:)
+    type(unit_conversion_t) :: conversion
+    real(wp), allocatable :: numbers(:, :)   ! [rows, columns]
+    integer, allocatable :: gaps(:), items(:), rows(:)
+    integer :: c, errors, i
+
+    errors = diagnostics%count
+    allocate (items, source=pack([(i, i=1, size(wanted))], self%columns > 0))
+    allocate (gaps(size(items)))
+    problems%file = self%path
+    call self%table%read_columns(self%columns(items), numbers, gaps, problems)
+    allocate (rows, source=pack([(i, i=1, self%table%rows)], [(.not. any(ieee_is_nan(numbers(i, :))), i=1, self%table%rows)]))
+    do c = 1, size(items)
+      call self%find_unit(group, items(c), conversion, diagnostics)
+      if (wanted(items(c))%si /= '') numbers(:, c) = conversion%convert(numbers(:, c))
+    end do
+    if (problems%errors == 0) call self%check_rows(self%columns(items), rows, numbers, items(1) == time, problems)
+    call problems%close(messages)
+    do i = 1, size(messages)
+      call self%report(group, 'file', messages(i)%text, diagnostics)
+    end do
+    if (diagnostics%count == errors) call put_lists(self, items, rows, numbers, group)
+  end subroutine take_columns
+
+  !> Gives a group the lists in place of the keys of their columns, and the number of rows that are left out.
+  subroutine put_lists(record, items, rows, numbers, group)
+    type(record_t), intent(in) :: record
+    integer, intent(in) :: items(:)         !! of `wanted`, [columns]
+    integer, intent(in) :: rows(:)          !! without gaps
+    real(wp), intent(in) :: numbers(:, :)   !! [rows of the table, columns]
+    type(group_t), intent(inout) :: group
+    integer :: c, i, k
+
+    do c = 1, size(items)
+      associate (list => group%values(group%key_position(trim(wanted(items(c))%list))))
+        list = empty_value(record%source)
+        allocate (list%numbers(size(rows)))
+        do k = 1, size(rows)
+          list%numbers(k) = numbers(rows(k), c)
+        end do
+      end associate
+    end do
+    if (size(rows) < record%table%rows) then
+      associate (gaps => group%values(group%key_position('gaps')))
+        gaps = empty_value(record%source)
+        gaps%whole_numbers = [record%table%rows - size(rows)]
+      end associate
+    end if
+    do i = 1, size(wanted)   ! they are of no use without the file
+      group%values(group%key_position(trim(wanted(i)%key))) = value_t()
+      if (wanted(i)%unit /= '' .and. wanted(i)%unit /= 'unit') then
+        group%values(group%key_position(trim(wanted(i)%unit))) = value_t()
+      end if
+    end do
+  end subroutine put_lists
+
+  !> The unit of a column: of its key, else of its heading. The one of values, which the machine decides on, is kept.
+  subroutine find_unit(self, group, item, conversion, diagnostics)
+    class(record_t), intent(in) :: self
+    type(group_t), intent(inout) :: group
+    integer, intent(in) :: item   !! of `wanted`
+    type(unit_conversion_t), intent(out) :: conversion
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=:), allocatable :: message, name, unit
+
+    if (wanted(item)%unit == '') return
+    call split_unit(self%table%headings(self%columns(item))%text, name, unit)
+    associate (given => group%values(group%key_position(trim(wanted(item)%unit))))
+      if (given%has_any()) unit = given%texts(1)%text
+      if (wanted(item)%si == '') then
+        if (given%has_any() .or. unit == '') return
+        given = empty_value(self%source)
+        allocate (given%texts(0))
+        call append(given%texts, unit)
+      else if (unit /= '') then
+        call find_conversion(unit, trim(wanted(item)%si), conversion, message)
+        if (message == '') return
+        message = message // '; column ' // to_text(self%columns(item)) // ' of ' // shown_path(self%path)
+        call self%report(group, trim(merge(wanted(item)%unit, 'file      ', given%has_any())), message, diagnostics)
+      end if
+    end associate
+  end subroutine find_unit
+
+  !> Refuses numbers beyond the range of an input, times that do not ascend, and too few rows.
+  subroutine check_rows(self, columns, rows, numbers, has_times, problems)
+    class(record_t), intent(in) :: self
     integer, intent(in) :: columns(:)       !! of the table
     integer, intent(in) :: rows(:)          !! without gaps
     real(wp), intent(in) :: numbers(:, :)   !! [rows of the table, columns]
@@ -217,16 +257,18 @@ contains
     do k = 1, size(rows)
       do c = 1, size(columns)
         limit = size_limit(numbers(rows(k), c), anything, ascends=has_times .and. c == 1)
-        if (limit /= '') call problems%add(table%lines(rows(k)), 'column ' // to_text(columns(c)) // ', ' // &
+        if (limit /= '') call problems%add(self%table%lines(rows(k)), 'column ' // to_text(columns(c)) // ', ' // &
                                            to_text(numbers(rows(k), c)) // ', is out of range; allowed: ' // limit(3:))
       end do
       if (k == 1 .or. .not. has_times) cycle
       before = rows(max(1, k - 1))
       if (numbers(rows(k), 1) > numbers(before, 1)) cycle
-      call problems%add(table%lines(rows(k)), 'the time, column ' // to_text(columns(1)) // ', ' // &
+      call problems%add(self%table%lines(rows(k)), 'the time, column ' // to_text(columns(1)) // ', ' // &
                         to_text(numbers(rows(k), 1)) // ', must be greater than ' // to_text(numbers(before, 1)) // &
-                        ' on line ' // to_text(table%lines(before)))
+                        ' on line ' // to_text(self%table%lines(before)))
     end do
-  end subroutine check_numbers
+    if (problems%errors == 0 .and. size(rows) < 2) call problems%add(0, to_text(size(rows)) // &
+                                                                     ' rows without gaps; needed: 2 at least')
+  end subroutine check_rows
 
 end module nocdyn_record_reader
