@@ -5,10 +5,11 @@ module nocdyn_fit_problem
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fit_comparisons, only: compare_measurements, fix_delays, refuse_unfitted
   use nocdyn_free_numbers, only: set_free_numbers
-  use nocdyn_input, only: input_t
+  use nocdyn_input, only: diagnostics_t, input_t
   use nocdyn_kinds, only: wp
   use nocdyn_least_squares, only: residuals_t
   use nocdyn_measurements, only: measurement_t
+  use nocdyn_text, only: to_text
   use nocdyn_unknowns, only: unknown_t
   implicit none (type, external)
   private
@@ -33,6 +34,7 @@ contains
     type(measurement_t), intent(in) :: measurements(:)
     type(fit_problem_t), intent(out) :: self
     type(error_t), allocatable, intent(out) :: error
+    type(diagnostics_t) :: diagnostics
     integer :: i
 
     self%input = input
@@ -46,8 +48,15 @@ contains
     do i = 1, size(self%comparisons)
       self%count = self%count + size(self%comparisons(i)%residuals())
     end do
-    if (self%count >= size(unknowns)) return
-    call raise(error, exit_input, input%shown_case() // ': fewer measured values than unknowns')
+    do i = 1, size(self%comparisons)
+      if (size(self%comparisons(i)%residuals()) > 0) cycle
+      call input%report(self%measurements(i)%group, 'name', 'none of its values is where something is computed, and none can ' // &
+                        'be fitted', diagnostics)
+    end do
+    call input%refuse(diagnostics, error)
+    if (allocated(error) .or. self%count >= size(unknowns)) return
+    call raise(error, exit_input, input%shown_case() // ': there are ' // to_text(self%count) // ' measured values for ' // &
+               to_text(size(unknowns)) // ' unknowns; needed: at least as many')
   end subroutine new_fit_problem
 
   subroutine evaluate(self, x, r, error)

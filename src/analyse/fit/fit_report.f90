@@ -1,7 +1,7 @@
 !> What a fit has found: values with standard errors, correlations, what cannot be told apart, and the measurements before and
 !> after.
 module nocdyn_fit_report
-  use nocdyn_comparisons, only: comparison_file, comparison_t, fit_files, of_damping, put_measurement
+  use nocdyn_comparisons, only: comparison_file, comparison_t, fit_files, left_out, of_damping, put_measurement
   use nocdyn_csv, only: text_cell
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -31,7 +31,7 @@ module nocdyn_fit_report
     real(wp) :: variance = 1.0_wp             !! of residuals over their deviations
     real(wp), allocatable :: error(:)         !! standard errors, [unknowns]
     logical, allocatable :: is_open(:)        !! whether a value is not determined, [unknowns]
-    type(string_t), allocatable :: notes(:)
+    type(string_t), allocatable :: notes(:)   !! of the start first
   contains
     procedure :: conclude
   end type machine_fit_t
@@ -43,7 +43,6 @@ contains
     class(machine_fit_t), intent(inout) :: self
     integer :: freedoms, i, k
 
-    allocate (self%notes(0))
     associate (solution => self%solution, n => size(self%unknowns))
       freedoms = size(solution%residuals) - (n - size(solution%undetermined, 2) - count(solution%is_at_bound))
       self%variance = 1.0_wp
@@ -79,6 +78,10 @@ contains
                                 'deviations of the measurements: the machine is another one, or there is a better solution ' // &
                                 'far from the start, which --starts 8 may find')
       end if
+      do i = 1, size(self%after)
+        if (left_out(self%after(i)) /= '') call append(self%notes, quoted(self%after(i)%measurement%name) // ': ' // &
+                                                                   left_out(self%after(i)))
+      end do
       if (.not. solution%has_converged) call append(self%notes, 'the fit has not converged: the values are the best so far')
     end associate
   end subroutine conclude

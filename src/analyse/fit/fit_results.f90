@@ -6,7 +6,7 @@ module nocdyn_fit_results
   use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_fit_problem, only: fit_problem_t, new_fit_problem
   use nocdyn_fit_report, only: fit_csv, machine_fit_t, fit_text, put_fit
-  use nocdyn_free_numbers, only: set_free_numbers
+  use nocdyn_free_numbers, only: note_starts, set_free_numbers
   use nocdyn_input, only: input_t
   use nocdyn_input_text, only: input_text
   use nocdyn_json, only: json_t
@@ -64,6 +64,7 @@ contains
     call new_fit_problem(input, self%fit%unknowns, measurements, problem, error)
     if (allocated(error)) return
     self%fit%before = problem%comparisons
+    call note_starts(input, self%fit%unknowns, self%fit%notes)
     call solve_from_starts(problem, max(1, options%starts), self%fit, error)
     if (allocated(error)) then
       error%message = input%shown_case() // ': ' // error%message

@@ -13,8 +13,8 @@ module nocdyn_comparisons
   implicit none (type, external)
   private
 
-  public :: append_comparison_files, comparison_file, new_comparison, of_damping, put_comparison_table, put_comparisons, &
-    put_measurement, write_comparisons
+  public :: append_comparison_files, comparison_file, left_out, new_comparison, of_damping, put_comparison_table, &
+    put_comparisons, put_measurement, write_comparisons
 
   character(len=*), parameter, public :: measured_files = 'measured_', fit_files = 'fit_'   !! names begin with
 
@@ -274,12 +274,21 @@ contains
         if (m%drifts) line = line // '; drifts by ' // rounded_text(m%drift(1), 3) // ' to ' // &
                              rounded_text(m%drift(2), 3) // ' s'
         if (m%finds_delay) call text%append_line(line)
-        if (one%outside > 0 .or. m%gaps > 0) call text%append_line('  left out: ' // to_text(one%outside) // &
-                                                                   ' values where nothing was computed, ' // to_text(m%gaps) // &
-                                                                   ' gaps of the file')
+        line = left_out(one)
+        if (line /= '') call text%append_line('  ' // line)
       end associate
     end do
   end subroutine write_comparisons
+
+  !> As "left out: 12 values where nothing was computed, 3 gaps of the file"; '' if nothing is.
+  function left_out(one) result(line)
+    type(comparison_t), intent(in) :: one
+    character(len=:), allocatable :: line
+
+    line = ''
+    if (one%outside > 0 .or. one%measurement%gaps > 0) line = 'left out: ' // to_text(one%outside) // &
+      ' values where nothing was computed, ' // to_text(one%measurement%gaps) // ' gaps of the file'
+  end function left_out
 
   !> As "measured gauge total_moment_shaft: 301 values, bias 0.31, spread 0.19 N m, ...".
   function line_on(one) result(line)

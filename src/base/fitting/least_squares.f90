@@ -272,27 +272,34 @@ contains
   subroutine find_covariance(low, high, scale, solution)
     real(wp), intent(in) :: low(:), high(:), scale(:)
     type(solution_t), intent(inout) :: solution
-    real(wp) :: scaled(size(solution%residuals), size(low)), values(size(low)), vectors(size(low), size(low))
+    real(wp), allocatable :: scaled(:, :), values(:), vectors(:, :)   ! of the free variables
     real(wp) :: inverse(size(low), size(low))
+    integer, allocatable :: free(:)
     integer :: k, n
-    logical :: free(size(low)), has_failed
+    logical :: has_failed
 
-    free = free_variables(solution, low, high)
-    do k = 1, size(low)
-      scaled(:, k) = merge(solution%jacobian(:, k) * scale(k), 0.0_wp, free(k))
+    allocate (free, source=pack([(k, k=1, size(low))], free_variables(solution, low, high)))
+    allocate (scaled(size(solution%residuals), size(free)), values(size(free)), vectors(size(free), size(free)))
+    do k = 1, size(free)
+      scaled(:, k) = solution%jacobian(:, free(k)) * scale(free(k))
     end do
-    call singular_vectors(scaled, values, vectors, has_failed)
-    n = count(values > no_effect * maxval(values))
-    if (has_failed) n = 0
+    n = 0
+    if (size(free) > 0) then
+      call singular_vectors(scaled, values, vectors, has_failed)
+      n = count(values > no_effect * maxval(values))
+      if (has_failed) n = 0
+    end if
     inverse = 0.0_wp
     do k = 1, n
-      inverse = inverse + spread(vectors(:, k), 2, size(low)) * spread(vectors(:, k), 1, size(low)) / values(k)**2
+      inverse(free, free) = inverse(free, free) + &
+                            spread(vectors(:, k), 2, size(free)) * spread(vectors(:, k), 1, size(free)) / values(k)**2
     end do
     solution%covariance = inverse * spread(scale, 2, size(low)) * spread(scale, 1, size(low))
-    solution%undetermined = vectors(:, n + 1:)
-    do k = 1, size(solution%undetermined, 2)
+    if (allocated(solution%undetermined)) deallocate (solution%undetermined)
+    allocate (solution%undetermined(size(low), size(free) - n), source=0.0_wp)
+    do k = 1, size(free) - n
+      solution%undetermined(free, k) = vectors(:, n + k)
       where (abs(solution%x) > 0) solution%undetermined(:, k) = solution%undetermined(:, k) * scale / abs(solution%x)
-      if (.not. all(free .or. abs(solution%undetermined(:, k)) <= 0.5_wp)) solution%undetermined(:, k) = 0.0_wp   ! at a bound
     end do
   end subroutine find_covariance
 

@@ -12,12 +12,14 @@ module nocdyn_schema_units
 
   !> Keys whose numbers have the unit of the number that another key of their group names by its path.
   type :: path_unit_t
-    character(len=5) :: group
+    character(len=7) :: group
     character(len=32) :: keys   !! separated by blanks
     character(len=6) :: path    !! the key with the path
   end type path_unit_t
 
   type(path_unit_t), parameter :: path_units(*) = [path_unit_t('vary', 'low high mean deviation median', 'target'), &
+                                                   path_unit_t('unknown', 'low high start prior deviation', 'target'), &
+                                                   path_unit_t('design', 'low high start step values', 'target'), &
                                                    path_unit_t('orbit', 'range', 'over')]
 
 contains

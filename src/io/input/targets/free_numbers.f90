@@ -5,12 +5,12 @@ module nocdyn_free_numbers
   use nocdyn_target_consistency, only: check_consistency
   use nocdyn_target_patterns, only: expand_path
   use nocdyn_targets, only: find_target, set_targets, target_t
-  use nocdyn_text, only: string_t, to_text
+  use nocdyn_text, only: append, string_t, to_text
   use nocdyn_units, only: from_si
   implicit none (type, external)
   private
 
-  public :: read_free_number, refuse_twice, set_free_numbers
+  public :: note_starts, read_free_number, refuse_twice, set_free_numbers
 
   type, public :: free_number_t
     integer :: group = 0                       !! in the input, that asks for it by `target`
@@ -87,6 +87,30 @@ contains
       call input%report(self%group, key, key // ': ' // message, diagnostics)
     end do
   end subroutine check_ends
+
+  !> Notes on numbers that do not begin with what the input has: beyond their bounds, or several values for one number.
+  subroutine note_starts(input, numbers, notes)
+    type(input_t), intent(in) :: input
+    class(free_number_t), intent(in) :: numbers(:)   !! read without mistakes
+    type(string_t), allocatable, intent(out) :: notes(:)
+    integer :: i, k
+
+    allocate (notes(0))
+    do i = 1, size(numbers)
+      associate (one => numbers(i))
+        if ((one%before < one%low .or. one%before > one%high) .and. .not. input%groups(one%group)%has_value('start')) then
+          call append(notes, one%path // ' = ' // to_text(one%before) // ' of the input is not between low and high: it ' // &
+                             'begins at ' // to_text(one%start))
+        end if
+        do k = 2, size(one%targets)
+          if (.not. abs(value_in(input, one%targets(k)) - one%before) > 0) cycle
+          call append(notes, one%path // ' has several values in the input, of which the first, ' // to_text(one%before) // &
+                             ', is shown as that before: all get one value')
+          exit
+        end do
+      end associate
+    end do
+  end subroutine note_starts
 
   !> The value of a number in its unit; 0 if the input gives none.
   pure real(wp) function value_in(input, target) result(value)

@@ -15,7 +15,7 @@ module nocdyn_target_search
   public :: search_target
 
   !> Groups whose keys cannot vary.
-  character(len=*), parameter :: fixed_groups = 'case output sweep vary record unknown'
+  character(len=*), parameter :: fixed_groups = 'case output sweep vary record unknown objective design'
 
 contains
 

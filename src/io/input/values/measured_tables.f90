@@ -26,6 +26,7 @@ contains
       if (all(groups(g)%kind /= ['excitation', 'drive     '])) cycle
       if (.not. groups(g)%has_value('measurement')) cycle
       call find_series(groups, g, m, diagnostics)
+      if (groups(g)%kind == 'drive' .and. .not. groups(g)%has_value('kind')) m = 0   ! which is reported
       if (m > 0) call take_table(groups(m), g, groups(g), diagnostics)
       groups(g)%values(groups(g)%key_position('measurement')) = value_t()
     end do
@@ -37,8 +38,10 @@ contains
     integer, intent(in) :: g
     integer, intent(out) :: m
     type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=*), parameter :: needed(*) = [character(len=9) :: 'kind', 'alignment', 'delay', 'scale', 'offset']
     type(string_t), allocatable :: names(:)
     character(len=:), allocatable :: wanted
+    integer :: k
 
     allocate (names(0))
     wanted = groups(g)%text('measurement')
@@ -53,7 +56,9 @@ contains
                   diagnostics)
       return
     end if
-    if (groups(m)%text('kind') /= 'series') then
+    if (.not. all([(groups(m)%has_value(trim(needed(k))), k=1, size(needed))])) then
+      m = 0   ! which is reported
+    else if (groups(m)%text('kind') /= 'series') then
       call report(groups(g), g, quoted(wanted) // " is of kind '" // groups(m)%text('kind') // "'; needed: 'series'", diagnostics)
       m = 0
     else if (groups(m)%text('alignment') /= 'given') then

@@ -54,7 +54,7 @@ contains
     type(record_t) :: record
     type(error_t), allocatable :: error
     character(len=:), allocatable :: text
-    integer :: errors, i
+    integer :: errors
 
     if (.not. group%has_value('file')) return
     record%index = raw%index
@@ -62,6 +62,10 @@ contains
     record%path = path_in(folder, record%source%texts(1)%text)
     group%values(group%key_position('file')) = value_t()
     errors = diagnostics%count
+    if (.not. group%has_value('kind')) then   ! which is reported
+      call leave_out(group, record%source)
+      return
+    end if
     call read_text_file(record%path, text, error)
     if (allocated(error)) then
       call record%report(group, 'file', error%message, diagnostics, exit_file)
@@ -72,11 +76,19 @@ contains
       call record%find_columns(group, diagnostics)
       if (diagnostics%count == errors) call record%take_columns(group, diagnostics)
     end if
-    if (diagnostics%count == errors) return
-    do i = 1, size(wanted)   ! values that are wrong are not looked at
-      group%values(group%key_position(trim(wanted(i)%list))) = empty_value(record%source)
-    end do
+    if (diagnostics%count > errors) call leave_out(group, record%source)
   end subroutine read_record
+
+  !> Leaves the values of a record out that is not read: they are not missing.
+  subroutine leave_out(group, source)
+    type(group_t), intent(inout) :: group
+    type(value_t), intent(in) :: source   !! its file
+    integer :: i
+
+    do i = 1, size(wanted)
+      group%values(group%key_position(trim(wanted(i)%list))) = empty_value(source)
+    end do
+  end subroutine leave_out
 
   !> Adds a message on a key.
   subroutine report(self, group, key, message, diagnostics, code)
@@ -103,7 +115,9 @@ contains
     type(value_t), intent(in) :: place
     type(value_t) :: value
 
-    value = value_t(place%is_given, place%line, place%override)
+    value%is_given = place%is_given
+    value%line = place%line
+    value%override = place%override
   end function empty_value
 
   !> Finds the columns that the kind of measurement and the keys want.
