@@ -44,7 +44,8 @@ contains
     setup%has_energy_balance = needs_work_integrals(plan%statistics)
     call new_asked_formulation(plan%input, plan%machine, formulation, setup%has_energy_balance)
     if (size(plan%statistics) > 0) call choose_settings(plan%input, formulation, settings, notes, error)
-    setup%lanes = block_lanes(findloc(formulation%states <= block_states, .true., dim=1))
+    ! without runs variants are analysed one by one: no chunk needs more of them than it has time for
+    if (size(plan%statistics) > 0) setup%lanes = block_lanes(findloc(formulation%states <= block_states, .true., dim=1))
     if (formulation%joints%count == 0) return
     if (.not. formulation%joints%only_lock()) setup%lanes = 1
     setup%has_energy_balance = .true.   ! a run has it, which takes the same steps

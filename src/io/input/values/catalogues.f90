@@ -221,6 +221,11 @@ contains
           value%numbers = [catalogue%values(c, row)]
         end associate
       end do
+      if (.not. group%has_value('kind')) return
+      if (group%text('kind') /= 'rubber' .or. group%values(group%key_position('stiffness'))%is_given) return
+      if (group%number('stiffness', absent=0.0_wp) > 0) return
+      call diagnostics%add(max(chosen%line, group%line), raw%index, 'size: ' // quoted(shortened(chosen%texts(1)%text)) // &
+                           ' has no stiffness in ' // file // "; kind = 'rubber' needs one", chosen%override)
     end associate
   end subroutine take_catalogue
 
