@@ -145,6 +145,8 @@ WRONG_CATALOGUES = {
     "size,stiffness\nA 250,soft\n": "couplings.csv:2: ",
     "size,stiffness\nA 250,-1\n": "couplings.csv:2: stiffness = -1 is out of range",
     "size,stiffness\n": "couplings.csv: no row",
+    "size,relative_damping\nA 250,1\n": "size: 'A 250' has no stiffness in couplings.csv; kind = 'rubber' needs one",
+    "size,stiffness,relative_damping\nA 200,1,1\nA 250,,1\n": "size: 'A 250' has no stiffness in couplings.csv",
 }
 
 

@@ -205,6 +205,41 @@ def test_bounds_hold_and_are_said(nocdyn):
     assert "load.drag.viscous is at its bound" in printed
 
 
+def test_unknowns_at_bounds_are_no_numbers_without_effect(nocdyn):
+    text, _, _ = record(nocdyn)
+    two = unknowns(a="low = 2100 high = 3000", c="low = 0.1 high = 0.5", v="low = 0.1 high = 2")
+    report, printed = fit(nocdyn, MACHINE.format(**TRUE) + text + two)
+    assert [(one["is_determined"], one["is_at_bound"]) for one in report["unknowns"]] == [
+        (True, True),
+        (True, True),
+        (True, False),
+    ]
+    assert "no measurement depends on" not in printed
+    assert "cannot be told apart" not in printed
+    assert "coupling.a.stiffness = 2000 of the input is not between low and high: it begins at 2100" in printed
+
+
+def test_one_number_for_several_is_said(nocdyn):
+    text, _, _ = record(nocdyn)
+    one = "&unknown target = 'coupling.*.stiffness' low = '1 kN m/rad' high = '5 kN m/rad' /\n"
+    report, printed = fit(nocdyn, MACHINE.format(**TRUE) + text + one)
+    assert "coupling.*.stiffness has several values in the input, of which the first, 2000, is shown" in printed
+    assert (report["unknowns"][0]["low"], report["unknowns"][0]["high"]) == (1000, 5000)
+
+
+def test_what_is_left_out_is_said(nocdyn):
+    text, measured, _ = record(nocdyn)
+    machine = MACHINE.format(**TRUE) + text + unknowns(v="low = 0.1 high = 2")
+    report, printed = fit(nocdyn, machine, "--set", "run.t_end=1.5")
+    outside = int(np.count_nonzero(TIMES > 1.5))
+    assert f"'m_omega_fan': left out: {outside} values where nothing was computed, 0 gaps of the file" in printed
+    assert report["values"] == measured.size - 3 * outside
+    outcome = nocdyn("fit", "machine.nml", "--out", "none", "--set", "measurement.m_omega_fan.from=5")
+    assert outcome.returncode == 2
+    assert "&measurement 'm_omega_fan': none of its values is where something is computed" in outcome.stderr
+    assert not (nocdyn.folder / "none").exists()
+
+
 def test_a_prior_pulls(nocdyn):
     """With a prior as narrow as the data, the mean of both."""
     text, _, _ = record(nocdyn)

@@ -286,6 +286,21 @@ SERIES = "&measurement name = 'g' signal = 'total_moment_c' times = 0, 1 values 
             "&measurement name = 'p' kind = 'peak' signal = 'omega_a' values = 1 /\n",
             "'p' is of kind 'peak'; needed: 'series'",
         ),
+        (
+            "&measurement name = 'g' kind = 'seris' signal = 'omega_a' file = 'log.csv' /\n",
+            "kind = 'seris' is not known; allowed: 'series', 'order', 'frequency', 'peak'; did you mean 'series'?",
+        ),
+        ("&measurement name = 'g' kind = 3 signal = 'omega_a' file = 'log.csv' /\n", "kind = 3 is not a text"),
+    ]
+    + [
+        (f"{SERIES.format(key)}&excitation name = 'x' body = 'a' kind = 'table' measurement = 'g' /\n", words)
+        for key, words in (
+            ("kind = 'seris'", "kind = 'seris' is not known"),
+            ("alignment = 'fund'", "alignment = 'fund' is not known"),
+            ("delay = x", "delay = x is not a number"),
+            ("scale = 'a'", "scale = 'a' is a text"),
+            ("offset = 'a'", "offset = 'a' is a text"),
+        )
     ],
 )
 def test_what_is_wrong_with_a_measurement_is_named(nocdyn, groups, words):

@@ -50,8 +50,8 @@ contains
     end do
     do i = 1, size(self%comparisons)
       if (size(self%comparisons(i)%residuals()) > 0) cycle
-      call input%report(self%measurements(i)%group, 'name', 'none of its values is where something is computed, and none can ' // &
-                        'be fitted', diagnostics)
+      call input%report(self%measurements(i)%group, 'name', 'none of its values is where something is computed, and ' // &
+                        'none can be fitted', diagnostics)
     end do
     call input%refuse(diagnostics, error)
     if (allocated(error) .or. self%count >= size(unknowns)) return

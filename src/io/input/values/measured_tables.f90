@@ -38,7 +38,7 @@ contains
     integer, intent(in) :: g
     integer, intent(out) :: m
     type(diagnostics_t), intent(inout) :: diagnostics
-    character(len=*), parameter :: needed(*) = [character(len=9) :: 'kind', 'alignment', 'delay', 'scale', 'offset']
+    character(len=*), parameter :: needed(*) = [character(len=9) :: 'alignment', 'delay', 'scale', 'offset']
     type(string_t), allocatable :: names(:)
     character(len=:), allocatable :: wanted
     integer :: k
@@ -56,10 +56,12 @@ contains
                   diagnostics)
       return
     end if
-    if (.not. all([(groups(m)%has_value(trim(needed(k))), k=1, size(needed))])) then
-      m = 0   ! which is reported
+    if (.not. groups(m)%has_value('kind')) then
+      m = 0   ! which is reported, as what follows is
     else if (groups(m)%text('kind') /= 'series') then
       call report(groups(g), g, quoted(wanted) // " is of kind '" // groups(m)%text('kind') // "'; needed: 'series'", diagnostics)
+      m = 0
+    else if (.not. all([(groups(m)%has_value(trim(needed(k))), k=1, size(needed))])) then
       m = 0
     else if (groups(m)%text('alignment') /= 'given') then
       call report(groups(g), g, 'the delay of ' // quoted(wanted) // ' is found by a run, which it cannot drive; needed: ' // &
