@@ -1,7 +1,8 @@
 !> What a fit has found: values with standard errors, correlations, what cannot be told apart, and the measurements before and
 !> after.
 module nocdyn_fit_report
-  use nocdyn_comparisons, only: comparison_file, comparison_t, fit_files, left_out, of_damping, put_measurement
+  use nocdyn_comparisons, only: comparison_file, comparison_t, fit_files, left_out, of_damping, put_measurement, &
+    shown_comparison
   use nocdyn_csv, only: text_cell
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
@@ -168,7 +169,7 @@ contains
     call report%append_line('  ' // padded('measurement', width) // cell('bias before') // cell('bias after') // &
                             cell('spread before') // cell('spread after') // cell('correlation'))
     do i = 1, size(self%after)
-      call report%append_line(line_on(self%before(i), self%after(i)))
+      call report%append_line(line_on(shown_comparison(self%before(i)), shown_comparison(self%after(i))))
       if (allocated(self%after(i)%measured_damping)) then
         call report%append_line(line_on(of_damping(self%before(i)), of_damping(self%after(i))))
       end if

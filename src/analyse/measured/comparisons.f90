@@ -14,7 +14,7 @@ module nocdyn_comparisons
   private
 
   public :: append_comparison_files, comparison_file, left_out, new_comparison, of_damping, put_comparison_table, &
-    put_comparisons, put_measurement, write_comparisons
+    put_comparisons, put_measurement, shown_comparison, write_comparisons
 
   character(len=*), parameter, public :: measured_files = 'measured_', fit_files = 'fit_'   !! names begin with
 
@@ -54,6 +54,20 @@ contains
     if (dampings == 0) return
     residuals(n + 1:) = (self%computed_damping - self%measured_damping) * self%measurement%damping_weight()
   end function residuals
+
+  !> A comparison as it is printed: frequencies in Hz.
+  pure type(comparison_t) function shown_comparison(comparison) result(self)
+    type(comparison_t), intent(in) :: comparison
+
+    self = comparison
+    if (comparison%measurement%kind /= measured_frequency .or. comparison%measurement%unit == '1') return
+    self%measurement%unit = 'Hz'
+    self%measured = from_si(comparison%measured, unit_hz)
+    self%computed = from_si(comparison%computed, unit_hz)
+    self%bias = from_si(comparison%bias, unit_hz)
+    self%spread = from_si(comparison%spread, unit_hz)
+    self%largest = from_si(comparison%largest, unit_hz)
+  end function shown_comparison
 
   !> Compares values at the same abscissae.
   type(comparison_t) function new_comparison(measurement, abscissa, measured, computed) result(self)
@@ -266,7 +280,7 @@ contains
 
     do i = 1, size(comparisons)
       associate (one => comparisons(i), m => comparisons(i)%measurement)
-        call text%append_line(line_on(one))
+        call text%append_line(line_on(shown_comparison(one)))
         if (allocated(one%measured_damping) .and. size(one%measured) > 0) call text%append_line(line_on(of_damping(one)))
         if (size(one%measured) < 2) cycle
         line = '  its clock: delay = ' // rounded_text(one%delay, 6) // ' s found by correlation, ' // &
