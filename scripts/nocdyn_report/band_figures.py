@@ -77,8 +77,9 @@ def _draw_response(axes: Axes, bands: Bands, curve: Curve) -> None:
             remark = f"limit, from {lowest:.4g} {curve.unit} on, is above"
         else:
             top = max(top, lowest)
+            limit = "the limit" if curve.order is None else "the limit of one order"
             above = curve.share_above
-            remark = "no variant exceeds the limit" if above == 0 else f"{_percent(above)} of the variants exceed the limit"
+            remark = f"no variant exceeds {limit}" if above == 0 else f"{_percent(above)} of the variants exceed {limit}"
     axes.set_ylim(0.0, HEADROOM * top)
     axes.set_title(plain(curve.title), loc="left")
     if remark:

@@ -78,6 +78,16 @@ def test_the_share_of_variants_above_the_limit_is_told(tmp_path, monkeypatch, ca
     assert "is above" in found["bands"] and "exceed" not in found["bands"]
 
 
+def test_one_order_is_judged_by_a_limit_of_one_order_alone(tmp_path, monkeypatch, capsys):
+    order = "&record response = 'shaft' order = 2 statistic = 'curve' /\n"
+    found = draw(monkeypatch, capsys, swept(tmp_path, 300, order), tmp_path / "all")
+    assert "limit" not in found["bands"]
+    largest = read(tmp_path / "swept").curves[0].values.max()
+    limit = f"1e4 vibratory_frequency = 1, 1e3 vibratory_moments = 2*{1.1 * largest}"
+    found = draw(monkeypatch, capsys, swept(tmp_path, limit, order), tmp_path / "one")
+    assert "no variant exceeds the limit of one order" in found["bands"]
+
+
 def test_curves_alone_are_enough_for_figures(tmp_path, monkeypatch, capsys):
     found = draw(monkeypatch, capsys, swept(tmp_path, records="&record mode = 1 statistic = 'curve' /\n"), tmp_path / "a")
     assert list(found) == ["campbell_bands"]

@@ -113,9 +113,19 @@ def test_bands_are_the_quantiles_of_the_curves_beside_that_of_the_input(nocdyn):
     assert bands["total_moment_c0_curve_limit [N m]"] == pytest.approx(np.full(9, 1e6 * modulus)), "that of the stress is lower"
     assert bands["stress_c0_curve_limit [Pa]"] == pytest.approx(np.full(9, 1e6))
     assert "mode_1_curve_limit [Hz]" not in bands
+    assert "total_moment_c0_order_2_curve_limit [N m]" not in bands, "limits of all orders together"
     summary = json.loads((nocdyn.folder / "swept/summary.json").read_text())
     assert summary["bands"]["points"] == 9 and len(summary["bands"]["curves"]) == 4
     assert list(summary["statistics"]) == ["total_moment_c0_peak"]
+
+
+def test_the_curve_of_one_order_has_the_limit_of_one_order(nocdyn):
+    limit = "&limit coupling = 'c0' vibratory_moment = 300 vibratory_frequency = 50, 450 vibratory_moments = 40, 80 /\n"
+    sweep(nocdyn, chain(4) + limit + RESPONSE + RUN + VARIED + RECORDS, "-q")
+    bands = bands_of(nocdyn.folder / "swept")
+    expected = np.interp(2 * bands["omega_b0 [rad/s]"], [50, 450], [40, 80])
+    assert bands["total_moment_c0_order_2_curve_limit [N m]"] == pytest.approx(expected)
+    assert bands["total_moment_c0_curve_limit [N m]"] == pytest.approx(np.full(9, 300))
 
 
 def test_a_sweep_without_curves_removes_the_bands_of_another_one(nocdyn):

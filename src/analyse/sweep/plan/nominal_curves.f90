@@ -69,7 +69,8 @@ contains
     if (any(curves%statistic == analysis_mode_curve)) call set_lines(input, self)
   end subroutine find_nominal_curves
 
-  !> The lowest limit of a curve at its point; of its stress, which is a multiple of the moment, in terms of the moment.
+  !> The lowest limit of a curve at its point; of its stress, which is a multiple of the moment, in terms of the moment. Limits of
+  !> the half range are of all orders together and say nothing of one of them, which has limits of single lines alone.
   real(wp) function limit_at(reader, one) result(lowest)
     type(analysis_reader_t), intent(in) :: reader
     type(analysis_result_t), intent(in) :: one
@@ -84,7 +85,8 @@ contains
         frequency = abs(speed)
         if (.not. reader%settings%axis%is_frequency) frequency = one%order * abs(speed)
         do k = 1, size(reader%limits)
-          limit = reader%limits(k)%continuous_limit(speed)
+          limit = no_limit
+          if (.not. one%order > 0) limit = reader%limits(k)%continuous_limit(speed)
           if (reader%limits(k)%has_curve() .and. frequency > 0) limit = min(limit, reader%limits(k)%amplitude_limit(frequency))
           if (limit >= no_limit) cycle
           do q = 1, size(quantities)
