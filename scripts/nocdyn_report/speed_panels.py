@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.legend import Legend
+from matplotlib.legend_handler import HandlerPatch
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.transforms import blended_transform_factory
 
 from .failure import ChoiceError
@@ -25,6 +27,21 @@ SHADES = {
 }
 
 Figures = Iterator[tuple[str, Figure]]
+
+
+class OperationPatch(Patch):
+    """What a legend shows of the speeds in operation: their shade with the bar at the axis."""
+
+
+class _OperationHandler(HandlerPatch):
+    def create_artists(self, legend, handle, x, y, width, height, size, transform):
+        """A patch as any other, and the bar on its lower edge."""
+        patches = super().create_artists(legend, handle, x, y, width, height, size, transform)
+        bar = Rectangle((-x, -y), width, 0.3 * height, facecolor=OPERATION, linewidth=0, transform=transform)
+        return [*patches, bar]
+
+
+Legend.update_default_handler_map({OperationPatch: _OperationHandler()})
 
 
 class Labels:
@@ -124,7 +141,9 @@ def shade_operation(axes: Axes, operation: Operation | None) -> list[Patch]:
         axes.axvspan(start, end, zorder=0, **SHADES[is_margin])
         if not is_margin:  # seen where barred speeds hide the shade
             axes.axvspan(start, end, 0.0, 0.015, facecolor=OPERATION, linewidth=0, zorder=1.5)
-    patches = [Patch(**SHADES[False], label=f"in operation: {operation.slow:.5g} to {operation.fast:.5g} rpm")]
+    patches: list[Patch] = [
+        OperationPatch(**SHADES[False], label=f"in operation: {operation.slow:.5g} to {operation.fast:.5g} rpm")
+    ]
     if operation.margin > 0:
         patches.append(Patch(**SHADES[True], label=f"margin of {100 * operation.margin:.3g} %"))
     return patches
