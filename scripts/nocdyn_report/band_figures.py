@@ -26,7 +26,11 @@ RANGE_NAMES = ("all variants", "90 % of the variants", "half of the variants")
 MEDIAN = {"linewidth": 1.5}
 NOMINAL = {"color": "black", "linewidth": 1.0, "linestyle": (0, (4, 1.5))}
 INSIDE = {"color": "0.15", "linewidth": 2.6, "solid_capstyle": "butt"}  # of an order within the band of a mode
+NEUTRAL = "0.35"  # of what all modes have, each in its own colour
 CRITICAL = "#7F3C8D"
+CRITICAL_SHADES = (0.14, 0.28)  # of all variants, and of 90 % above them
+PLACES = 9  # along a text where it must not cover a mode
+CLEARANCE = 0.06  # of a text from the band of a mode [in]
 
 
 def band_figures(bands: Bands, title: str) -> Iterator[tuple[str, Figure]]:
@@ -134,16 +138,22 @@ def draw_campbell(bands: Bands, title: str) -> Figure:
     name_modes(axes, campbell)
     labels = Labels(axes, PANEL)
     for critical in sorted(bands.criticals, key=lambda one: one.speeds[2]):
-        _mark_critical(axes, labels, critical, next((curve for curve in modes if curve.mode == critical.mode), None), bands)
+        _mark_critical(axes, labels, critical, modes, bands.speed)
     axes.set_xlabel(plain(f"{bands.axis.label} [{bands.axis.unit}]"))
     axes.set_ylabel("frequency [Hz]")
     above = [curve.mode for curve in modes if np.nanmin(curve.statistics["min"]) > axes.get_ylim()[1]]
     axes.set_title("natural frequencies and orders" + hidden_words(above), loc="left", pad=22)
-    handles = [Line2D([], [], label="orders, named at the border", **ORDER), *_legend(modes, colour_of(modes[0].mode))]
+    handles = [
+        Line2D([], [], label="orders, named at the border", **ORDER),
+        *_legend(modes, colour_of(modes[0].mode) if len(modes) == 1 else NEUTRAL),
+    ]
     if bands.lines:
         handles.append(Line2D([], [], label="order within 90 % of a mode", **INSIDE))
     if bands.criticals:
-        handles.append(Patch(facecolor=CRITICAL, alpha=0.35, linewidth=0, label="critical speeds: 90 %, all variants"))
+        handles += [
+            Patch(facecolor=CRITICAL, alpha=shade, linewidth=0, label=f"critical speeds: {name}")
+            for shade, name in ((CRITICAL_SHADES[0], "all variants"), (sum(CRITICAL_SHADES), "90 %"))
+        ]
     add_legend(figure, handles=handles + shades, ncols=4, fontsize=8.5)
     return figure
 
@@ -155,21 +165,26 @@ def _mark_inside(axes: Axes, speed: np.ndarray, curve: Curve, frequency: np.ndar
     axes.plot(fine, np.where((low <= order) & (order <= high), order, np.nan), zorder=5, **INSIDE)
 
 
-def _mark_critical(axes: Axes, labels: Labels, critical: CriticalBand, curve: Curve | None, bands: Bands) -> None:
+def _mark_critical(axes: Axes, labels: Labels, critical: CriticalBand, modes: Sequence[Curve], speed: np.ndarray) -> None:
     """Shades the critical speeds of an order and a mode below the band of the mode, and tells their range."""
     first, low, middle, high, last = critical.speeds
-    top = axes.get_ylim()[1]
-    height = np.interp(middle, bands.speed, curve.statistics["median"]) / top if curve else 1.0
     if not (axes.get_xlim()[0] <= middle <= axes.get_xlim()[1]):
         return
-    reach = min(float(height), 1.0)
-    axes.axvspan(first, last, 0.0, reach, facecolor=CRITICAL, alpha=0.14, linewidth=0, zorder=1)
-    axes.axvspan(low, high, 0.0, reach, facecolor=CRITICAL, alpha=0.28, linewidth=0, zorder=1)
-    text = f"{roman(critical.mode)}/{critical.order:.6g}: {low:.4g}\N{EN DASH}{high:.4g}"
+    top = axes.get_ylim()[1]
+    medians = [curve.statistics["median"] for curve in modes if curve.mode == critical.mode]
+    reach = min([float(np.interp(middle, speed, median)) / top for median in medians] + [1.0])
+    for (start, end), shade in zip(((first, last), (low, high)), CRITICAL_SHADES):
+        axes.axvspan(start, end, 0.0, reach, facecolor=CRITICAL, alpha=shade, linewidth=0, zorder=1)
+    text = f"{roman(critical.mode)}/{critical.order:.6g}: {low:.4g}\N{EN DASH}{high:.4g} rpm"
     width, line = text_size(text)
-    for y in np.arange(1.5 * line / labels.size[1], 0.9, 1.2 * line / labels.size[1]):
-        x = min(max(float(share_of(axes, middle)), width / 2 / labels.size[0]), 1 - width / 2 / labels.size[0])
-        if labels.is_free(x, float(y), width, line):
+    x = min(max(float(share_of(axes, middle)), width / 2 / labels.size[0]), 1 - width / 2 / labels.size[0])
+    ends = axes.get_xlim()[0] + (x + np.array([-0.5, 0.5]) * width / labels.size[0]) * np.ptp(axes.get_xlim())
+    below = np.linspace(*ends, PLACES)
+    taken = [[np.interp(below, speed, curve.statistics[word]) / top for word in RANGES[0]] for curve in modes]
+    room = (0.5 * line + CLEARANCE) / labels.size[1]
+    for y in np.arange(1.5 * line, 0.9 * labels.size[1], 0.3 * line) / labels.size[1]:
+        hides_a_mode = any(((bottom < y + room) & (y - room < peak)).any() for bottom, peak in taken)
+        if not hides_a_mode and labels.is_free(x, float(y), width, line):
             style = {"fontsize": SMALL, "color": CRITICAL, "ha": "center", "va": "center", "bbox": HALO, "zorder": 6}
             axes.text(x, y, text, transform=axes.transAxes, **style)
             return
