@@ -1,6 +1,7 @@
 """What the columns of tables of results are: columns.json, of a response response_columns.json. Figures and report name, order
 and choose columns by it."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -29,6 +30,7 @@ class Column:
     rank: int = DETAIL
     statistic: str = ""  # 'half_range', '' of the signal itself
     file: str = ""  # the table, '' if it is in none
+    long_name: str = ""  # of a result of a sweep, what it is, in words
 
     @property
     def is_inner(self) -> bool:
@@ -41,6 +43,13 @@ class Column:
         if not self.element:
             return self.caption
         return f"{self.element}{'' if self.is_inner else ' '}{self.point}".rstrip()
+
+    def described(self, words: str) -> tuple[str, str]:
+        """'stress_shaft, largest value' as one reads it, 'shaft, shear stress, largest value', and its last part."""
+        quantity, *rest = re.split(r"(?=[,:] )", words, maxsplit=1)
+        if not rest or not self.element or not self.name.startswith(quantity):
+            return words, words
+        return f"{self.title}, {self.caption}{rest[0]}", re.split("[,:] ", rest[0])[-1]
 
     def is_of(self, other: "Column") -> bool:
         """Whether both are of one element."""

@@ -23,6 +23,7 @@ TABLE, ORDERS = "response.csv", "response_orders.csv"
 LIMITS = ("limit", "transient_limit", "peak_limit")
 STATISTICS = ("half_range", "mean", "peak", *LIMITS)
 NAMED = 4  # orders that are named beside the curve of all
+PREFIXED = ("N", "Pa", "W", "J")  # beginnings of units that take a prefix
 NEAR = 2.5  # times what is drawn: limits above are not in the picture
 
 
@@ -33,6 +34,8 @@ def rpm(speed: float) -> float:
 
 def short_unit(unit: str, largest: float) -> tuple[float, str]:
     """What numbers up to the largest are divided by, and their unit then: kN m, MN m or MPa if they are large."""
+    if re.split("[ /]", unit)[0] not in PREFIXED:
+        return 1.0, unit
     steps = ((1e6, "M", 1e4),) if unit == "Pa" else ((1e6, "M", 1e7), (1e3, "k", 1e4))
     factor, prefix = next(((f, p) for f, p, least in steps if least <= largest < np.inf), (1.0, ""))
     return factor, prefix + unit

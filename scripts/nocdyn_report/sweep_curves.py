@@ -86,7 +86,7 @@ def draw_family(axes: Axes, sweep: Sweep, family: Family, result: Variable) -> N
         )
     mark_not_done(axes, sweep, family.key)
     axes.set_title(plain(result.long_name), loc="left")
-    axes.set_ylabel(wrapped(result.label))
+    axes.set_ylabel(wrapped(result.short_label))
 
 
 def _mark_peak(axes: Axes, family: Family, result: Variable, curve: tuple[np.ndarray, np.ndarray], name: str) -> str:

@@ -56,7 +56,7 @@ def draw_scatters(sweep: Sweep, results: Sequence[Variable], influence: Influenc
         figsize=(max(0.85 * WIDTH, 2.9 * columns + 1.0), (2.5 if are_all else 2.9) * len(results) + 1.2),
     )
     for row, result in zip(grid, results):
-        row[0].set_ylabel(wrapped(result.label))
+        row[0].set_ylabel(wrapped(result.full_label), fontsize=9)
         for axes, key in zip(row, sweep.varied if are_all else influence.strongest_first(result)):
             draw_scatter(axes, sweep, key, result)
             if not are_all or result is results[-1]:
@@ -133,6 +133,7 @@ def figures_of(sweep: Sweep) -> Iterator[tuple[str, Figure]]:
     """Names and figures; those of many results go on in NAME_2 ..."""
     if not sweep.results:
         return
+    sweep = sweep.in_short()
     family = family_of(sweep)
     if family is None or not sweep.is_grid:  # how often a value comes along a curve says nothing
         yield from _paged("histograms", sweep, draw_histograms)

@@ -1,5 +1,6 @@
 """How much each varied number of a sweep has to do with each result."""
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from .sweep_panels import chance, rank_correlation
 from .sweep_results import Sweep, Variable
 
 MOST_BARS = 15
+TITLE_LENGTH = 60  # characters that fit on a line beside the names
 RISING, FALLING = COLOURS[0], COLOURS[1]
 
 
@@ -61,4 +63,4 @@ def draw_influence(axes: Axes, sweep: Sweep, influence: Influence, result: Varia
     axes.set_ylim(len(keys) - 0.4, -0.6)
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
-    axes.set_title(plain(result.label), loc="left")
+    axes.set_title(plain(textwrap.fill(result.title, TITLE_LENGTH)), loc="left")

@@ -39,14 +39,14 @@ SHADES = LinearSegmentedColormap.from_list("shades", colormaps["Blues"](np.linsp
 
 
 def wrapped(label: str, length: int = LABEL_LENGTH) -> str:
-    """A label on several lines if it is long, broken after dots and underscores and before the unit."""
+    """A label on several lines if it is long, broken after words, dots and underscores and before the unit."""
     lines = [""]
-    for piece in re.split(r"(?<=[._])|(?= \[)", label):
+    for piece in re.split(r"(?<=[._])(?!\d)|(?<= )(?![^[]*\])(?!\[)|(?= \[)", label):
         if lines[-1] and len(lines[-1]) + len(piece) > length:
-            lines.append(piece.strip())
+            lines.append(piece.lstrip())
         else:
             lines[-1] += piece
-    return plain("\n".join(lines))
+    return plain("\n".join(line.rstrip() for line in lines))
 
 
 def is_wide(values: np.ndarray) -> bool:
@@ -121,7 +121,7 @@ def draw_histogram(axes: Axes, sweep: Sweep, result: Variable) -> None:
         axes.plot([], [], " ", label=plain(f"{len(values) - len(inside)} further out,\n{_far_ends(values, inside, result)}"))
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set_title(plain(result.long_name), loc="left")
-    axes.set_xlabel(plain(result.label))
+    axes.set_xlabel(plain(result.short_label))
     axes.set_ylabel("variants")
     axes.grid(visible=False, axis="x")
 
@@ -263,7 +263,7 @@ def _add_colour_bar(axes: Axes, drawn: ScalarMappable, result: Variable, values:
     """Of all colours, opaque; with a tip where values are beyond them."""
     extend = ("neither", "min", "max", "both")[(values.min() < drawn.norm.vmin) + 2 * (values.max() > drawn.norm.vmax)]
     bar = axes.figure.colorbar(ScalarMappable(drawn.norm, drawn.cmap), ax=axes, extend=extend)
-    bar.set_label(wrapped(result.label))
+    bar.set_label(wrapped(result.short_label))
 
 
 def grid_cells(sweep: Sweep, result: Variable) -> tuple[np.ndarray, np.ndarray, np.ma.MaskedArray]:
@@ -330,7 +330,7 @@ def draw_parallel(axes: Axes, sweep: Sweep, keys: Sequence[Variable], result: Va
     axes.set_xlim(-0.3, len(variables) - 0.7)
     axes.set_ylim(-0.12, 1.12)
     axes.set_yticks([])
-    axes.set_xticks(places, [wrapped(variable.label, 18) for variable in variables], fontsize=8)
+    axes.set_xticks(places, [wrapped(variable.short_label, 18) for variable in variables], fontsize=8)
     axes.tick_params(length=0)
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.grid(visible=False)

@@ -11,6 +11,7 @@ import pandas as pd
 
 from .columns import Column, read_column_list
 from .failure import ResultsError
+from .speed_results import short_unit
 from .trajectory_files import need_folder, text_of
 
 DONE, REFUSED, FAILED = 0, 1, 2
@@ -29,6 +30,7 @@ class Variable:
     long_name: str
     values: np.ndarray
     statistic: str = ""  # of a result
+    words: str = ""  # of a result: the end of its long name
 
     @property
     def is_curve(self) -> bool:
@@ -37,7 +39,31 @@ class Variable:
 
     @property
     def label(self) -> str:
-        return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
+        """As in tables."""
+        return self._in_unit(self.name)
+
+    @property
+    def title(self) -> str:
+        """A result in words; a varied number as the input has it."""
+        return self.long_name if self.words else self.name
+
+    @property
+    def full_label(self) -> str:
+        return self._in_unit(self.title)
+
+    @property
+    def short_label(self) -> str:
+        """Where the long name is beside it."""
+        return self._in_unit(self.words or self.name)
+
+    def _in_unit(self, text: str) -> str:
+        return f"{text} [{self.shown_unit}]" if self.shown_unit else text
+
+    def in_short(self) -> "Variable":
+        """In kN m, MN m or MPa, if the numbers are large, but for outliers."""
+        finite = np.abs(self.values[np.isfinite(self.values)])
+        factor, unit = short_unit(self.unit, float(np.quantile(finite, 0.95)) if finite.size else 0.0)
+        return replace(self, unit=unit, values=self.values / factor)
 
     @property
     def shown_unit(self) -> str:
@@ -66,6 +92,11 @@ class Sweep:
     def known(self, result: Variable) -> np.ndarray:
         """The variants that have the result."""
         return np.flatnonzero((self.status == DONE) & np.isfinite(result.values))
+
+    def in_short(self) -> "Sweep":
+        """For figures."""
+        varied, results = ([one.in_short() for one in variables] for variables in (self.varied, self.results))
+        return replace(self, varied=varied, results=results)
 
     @property
     def not_done(self) -> np.ndarray:
@@ -187,8 +218,13 @@ def _curve(column: Column, variables: list[Variable]) -> tuple[Variable, list[Va
 
 
 def _with_statistics(results: list[Variable], columns: list[Column]) -> list[Variable]:
-    known = {column.label: column.statistic for column in columns}
-    return [replace(result, statistic=known.get(result.label, "")) for result in results]
+    known = {column.label: column for column in columns if column.file != BANDS}
+    return [_described(result, known[result.label]) if result.label in known else result for result in results]
+
+
+def _described(result: Variable, column: Column) -> Variable:
+    long_name, words = column.described(column.long_name or result.long_name)
+    return replace(result, statistic=column.statistic, long_name=long_name, words=words)
 
 
 def _variable(table: pd.DataFrame, label: str) -> Variable:

@@ -134,6 +134,18 @@ def test_a_sweep_is_drawn_without_its_kind_being_named(tmp_path, capsys):
     assert "histograms" in capsys.readouterr().out
 
 
+def test_results_are_named_in_words_and_units_as_in_bands(tmp_path):
+    folder = write_sweep(tmp_path, "random", {LOAD: np.arange(9.0), CUBIC: 1e5 + np.arange(9.0)}, {MOMENT: 2e4 + np.arange(9.0)})
+    names = {"element_kind": "coupling", "element": "coupling", "caption": "elastic moment"}
+    entry = json.loads((folder / "columns.json").read_text())["columns"][0] | names
+    entry |= {"label": f"{MOMENT} [N m]", "long_name": "moment_coupling, all orders: largest value"}
+    (folder / "columns.json").write_text(json.dumps({"columns": [entry]}))
+    histograms, scatter, influence = draw_only(folder, "histograms", "scatter", "influence")
+    assert ">coupling, elastic moment, all orders: largest value<" in histograms and ">largest value [kN m]<" in histograms
+    assert "median: 20.004 kN m<" in histograms and "[kN m/rad3]" in scatter
+    assert MOMENT not in histograms + scatter + influence
+
+
 def test_percentiles_are_those_of_the_printed_summary(tmp_path):
     order = np.random.default_rng(1).permutation(101)
     folder = write_sweep(tmp_path, "random", {LOAD: order}, {MOMENT: order + 1.0})
@@ -145,7 +157,7 @@ def test_percentiles_that_differ_little_are_told_apart(tmp_path):
     order = np.random.default_rng(1).permutation(101)
     folder = write_sweep(tmp_path, "random", {LOAD: order}, {MOMENT: 1e4 + 1e-5 * order, SPEED: np.full(101, 100.0 / 3.0)})
     [text] = draw_only(folder, "histograms")
-    assert "5 %: 10000.00005 N m<" in text and "median: 10000.0005 N m<" in text and "95 %: 10000.00095 N m<" in text
+    assert "5 %: 10.00000005 kN m<" in text and "median: 10.0000005 kN m<" in text and "95 %: 10.00000095 kN m<" in text
     assert "5 %: 33.333 rad/s<" in text and "95 %: 33.333 rad/s<" in text
 
 
