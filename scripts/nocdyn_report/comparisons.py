@@ -19,6 +19,7 @@ class Comparison:
 
     facts: Mapping  # a member of the list
     table: pd.DataFrame  # measured_NAME.csv
+    body: str = ""  # whose speed is that of orders, if the report says it
 
     @property
     def name(self) -> str:
@@ -86,6 +87,7 @@ def read_comparisons(folder: Path, report: str) -> list[Comparison]:
     file = folder / report
     if not file.is_file():
         return []
-    members = json.loads(file.read_text(encoding="utf-8")).get("measurements", [])
+    content = json.loads(file.read_text(encoding="utf-8"))
+    members = content.get("measurements", [])
     there = (one for one in members if one["values"] > 0 and (folder / one["file"]).is_file())
-    return [Comparison(one, pd.read_csv(folder / one["file"])) for one in there]
+    return [Comparison(one, pd.read_csv(folder / one["file"]), content.get("body", "")) for one in there]

@@ -3,21 +3,23 @@
 import argparse
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import f90nml
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.figure import Figure
 
 from .comparisons import FREQUENCY, SERIES, Comparison, read_comparisons
 from .json_files import read_json, with_case
-from .measured_figures import COMPUTED, DIGITS, LONGEST, MEASURED, MOST_POINTS, draw_bars
+from .measured_figures import COMPUTED, DIGITS, LONGEST, MEASURED, MOST_POINTS, abscissa_label, add_legend_above, draw_bars
 from .report.result_files import case_of
 from .speed_results import rpm
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, plain, save, saved
 from .thinning import thin
 
-REPORT = "fit.json"
+REPORT, FITTED = "fit.json", "fitted.nml"
 BEFORE = {"color": COLOURS[1], "linewidth": 0.9}
 CONFIDENT = 1.959963984540054  # standard errors on either side of 95 % of a normal distribution
 MOST_NUMBERS = 12  # unknowns whose correlations have room as numbers
@@ -26,7 +28,7 @@ BAND = {"color": "0.85", "linewidth": 0.0, "zorder": 0}
 
 def draw_measurement(one: Comparison, title: str) -> Figure:
     """What was measured with the computed values before and after, and below the differences."""
-    figure, (upper, lower) = pyplot.subplots(2, 1, sharex=True, figsize=(WIDTH, 5.4), height_ratios=(2, 1))
+    figure, (upper, lower) = pyplot.subplots(2, 1, sharex=True, figsize=(WIDTH, 5.6), height_ratios=(2, 1))
     x = one.abscissa if one.kind == SERIES else rpm(one.abscissa)
     mark = {"marker": "o", "markersize": 3.5} if one.kind != SERIES or len(x) <= MOST_POINTS else {}
     line = {} if one.kind == SERIES else {"linestyle": "none", "zorder": 3}
@@ -36,12 +38,11 @@ def draw_measurement(one: Comparison, title: str) -> Figure:
             upper.plot(*thin(x, values, PIXELS), label=label, **look)
             lower.plot(*thin(x, values - one.measured, PIXELS), **look, **mark)
     if deviation := one.facts.get("deviation"):
-        lower.axhspan(-2 * deviation, 2 * deviation, **BAND, label="± 2 standard deviations of the measurement")
-        lower.legend(loc="best", fontsize=8.5)
-    upper.legend(loc="best", ncols=3)
+        lower.axhspan(-2 * deviation, 2 * deviation, **BAND, label="below: ± 2 standard deviations of the measurement")
+    add_legend_above(upper, lower)
     upper.set_ylabel(plain(textwrap.fill(f"{one.facts['caption']} [{one.unit}]", LONGEST)))
-    lower.set_ylabel(f"computed\nless measured [{one.unit}]")
-    lower.set_xlabel("time [s]" if one.kind == SERIES else "speed [rpm]")
+    lower.set_ylabel(f"computed less\nmeasured\n[{one.unit}]")
+    lower.set_xlabel(plain(abscissa_label(one)))
     add_title(figure, title, f"{one.name}: {one.subject}", _remark(one))
     return figure
 
@@ -135,14 +136,23 @@ def draw_all(folder: Path) -> dict[str, Figure]:
     report = read_json(folder / REPORT, ("unknowns", "measurements"))
     title = with_case(report["title"] or Path(report["input"]).name, case_of(folder, "fit"))
     figures = {}
+    body = _response_body(folder / FITTED)
     for one in read_comparisons(folder, REPORT):
         is_curve = one.kind != FREQUENCY and len(one.measured) > 1
         draw = draw_measurement if is_curve else draw_values
-        figures[one.facts["file"].removesuffix(".csv")] = draw(one, title)
+        figures[one.facts["file"].removesuffix(".csv")] = draw(replace(one, body=body), title)
     figures["fit_unknowns"] = draw_unknowns(report["unknowns"], title)
     if len(report["unknowns"]) > 1:
         figures["fit_correlations"] = draw_correlations(report["unknowns"], title)
     return figures
+
+
+def _response_body(file: Path) -> str:
+    """Whose speed that of orders is; '' if it is not known."""
+    try:
+        return f90nml.read(file).get("response", {}).get("body", "")
+    except OSError:
+        return ""
 
 
 def main() -> None:

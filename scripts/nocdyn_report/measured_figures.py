@@ -10,13 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .comparisons import FREQUENCY, ORDER, SERIES, Comparison, read_comparisons
+from .speed_panels import speed_label
 from .speed_results import rpm
 from .style import COLOURS, PIXELS, REFERENCE, WIDTH, add_title, plain
 from .thinning import thin
 
 MEASURED = {"color": "0.55", "linewidth": 1.0}
 COMPUTED = {"color": COLOURS[0], "linewidth": 1.2}
-LONGEST = 34  # characters of a line beside a panel
+LONGEST = 28  # characters of a line beside a panel
 MOST_POINTS = 40  # of a record that has a mark for each value
 DIGITS = 4
 GROUP = 0.78  # width of the bars side by side
@@ -42,22 +43,35 @@ def _value(comparison: Comparison, key: str) -> str:
 
 def draw_comparison(comparison: Comparison, title: str) -> Figure:
     """Both over the time or the speed, and below them the differences."""
-    figure, (upper, lower) = pyplot.subplots(2, 1, sharex=True, figsize=(WIDTH, 5.2), height_ratios=(2, 1))
+    figure, (upper, lower) = pyplot.subplots(2, 1, sharex=True, figsize=(WIDTH, 5.4), height_ratios=(2, 1))
     x = comparison.abscissa if comparison.kind == SERIES else rpm(comparison.abscissa)
     mark = {"marker": "o", "markersize": 3.5} if comparison.kind == ORDER or len(x) <= MOST_POINTS else {}
     line = {} if comparison.kind == SERIES else {"linestyle": "none"}  # between the measured speeds it may have been anything
     upper.plot(*thin(x, comparison.measured, PIXELS), label="measured", **MEASURED, **mark, **line)
     upper.plot(*thin(x, comparison.computed, PIXELS), label="computed", **COMPUTED, **mark)
-    lower.axhline(comparison.value("bias"), **REFERENCE)
+    lower.axhline(comparison.value("bias"), label="below: bias, their mean difference", **REFERENCE)
     lower.plot(*thin(x, comparison.computed - comparison.measured, PIXELS), color=COLOURS[1], linewidth=1.0, **mark)
-    upper.legend(loc="best", ncols=2)
+    add_legend_above(upper, lower)
     upper.set_ylabel(plain(textwrap.fill(f"{comparison.facts['caption']} [{comparison.unit}]", LONGEST)))
-    lower.set_ylabel(f"difference\n[{comparison.unit}]")
-    lower.set_xlabel("time [s]" if comparison.kind == SERIES else "speed [rpm]")
+    lower.set_ylabel(f"computed less\nmeasured\n[{comparison.unit}]")
+    lower.set_xlabel(plain(abscissa_label(comparison)))
     if not mark:
         lower.set_xlim(min(x), max(x))
     add_title(figure, title, f"{comparison.name}: {comparison.subject}", remark_on(comparison))
     return figure
+
+
+def abscissa_label(comparison: Comparison) -> str:
+    if comparison.kind == SERIES:
+        return "time [s]"
+    return speed_label(comparison.body) if comparison.body else "speed [rpm]"
+
+
+def add_legend_above(upper: Axes, lower: Axes) -> None:
+    """Of both panels, above them: in them are curves."""
+    entries = [axes.get_legend_handles_labels() for axes in (upper, lower)]
+    handles, labels = ([*one, *other] for one, other in zip(*entries))
+    upper.legend(handles, labels, loc="lower left", bbox_to_anchor=(0, 1), ncols=len(handles), fontsize=8.5)
 
 
 def draw_frequencies(comparison: Comparison, title: str) -> Figure:

@@ -48,6 +48,11 @@ def test_measured_orders_are_points_over_the_speed_in_rpm(nocdyn):
     assert measured.get_xdata() == pytest.approx([300, 600]) and measured.get_linestyle() == "None"
     assert list(measured.get_ydata()) == [4, 70]
     table = pd.read_csv(nocdyn.folder / "out/measured_o.csv")
+    lower = figures["measured_o"].axes[1]
+    assert lower.get_xlabel() == "speed of a [rpm]"
+    legend = [text.get_text() for text in figures["measured_o"].axes[0].get_legend().get_texts()]
+    assert legend == ["measured", "computed", "below: bias, their mean difference"]
+    assert lower.lines[0].get_ydata()[0] == pytest.approx((computed.get_ydata() - measured.get_ydata()).mean())
     assert list(computed.get_ydata()) == pytest.approx(list(table["computed [N m]"]))
 
 
@@ -72,6 +77,9 @@ def test_a_fit_is_drawn(nocdyn, monkeypatch):
     drawn = [list(line.get_ydata()) for line in upper.lines]
     assert drawn == [pytest.approx(list(table[f"{word} [N m]"])) for word in ("measured", "before", "computed")]
     assert list(lower.lines[1].get_ydata()) == pytest.approx(list(table["difference [N m]"]))
+    legend = [text.get_text() for text in upper.get_legend().get_texts()]
+    assert legend[-1] == "below: ± 2 standard deviations of the measurement" and lower.get_legend() is None
+    assert figures["fit_o"].axes[1].get_xlabel() == "speed of a [rpm]"
     frequencies, dampings = ([bar.get_height() for bar in axes.patches] for axes in figures["fit_f"].axes)
     assert frequencies[0] == pytest.approx(19.2) and len(frequencies) == 3 and dampings[0] == 0.021
     left, right = figures["fit_unknowns"].axes
