@@ -44,7 +44,7 @@ REPORTS = {  # of recorded paths, in the critical section
         "table_text",
     ),
     *(f"{command}_{part}" for command in ("campbell", "response", "modes") for part in ("files", "report", "results")),
-    *("equilibrium_report", "equilibrium_results", "response_verdict", "verdicts"),
+    *("equilibrium_report", "equilibrium_results", "report_openings", "response_verdict", "verdicts"),
 }
 ORBITS = {  # in the critical section, with their runs; without a journal
     "log_file",
