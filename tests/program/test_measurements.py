@@ -290,6 +290,11 @@ SERIES = "&measurement name = 'g' signal = 'total_moment_c' times = 0, 1 values 
             "&measurement name = 'g' kind = 'seris' signal = 'omega_a' file = 'log.csv' /\n",
             "kind = 'seris' is not known; allowed: 'series', 'order', 'frequency', 'peak'; did you mean 'series'?",
         ),
+        (
+            "&measurement name = 'g' signal = 'omega_a' file = 'first.csv' column = 'n' /\n",
+            "there is no column 'n' in first.csv: line 1 looks like headings, but line 2 is no row of numbers: '5x'",
+        ),
+        ("&measurement name = 'g' signal = 'omega_a' file = 'none.csv' column = 'n' /\n", "none.csv has no row of numbers"),
         ("&measurement name = 'g' kind = 3 signal = 'omega_a' file = 'log.csv' /\n", "kind = 3 is not a text"),
     ]
     + [
@@ -305,6 +310,8 @@ SERIES = "&measurement name = 'g' signal = 'total_moment_c' times = 0, 1 values 
 )
 def test_what_is_wrong_with_a_measurement_is_named(nocdyn, groups, words):
     nocdyn.write("log.csv", "t;n\n0;1\n1;2\n")
+    nocdyn.write("first.csv", "t;n\n0;5x\n1;1\n2;2\n3;3\n4;4\n")
+    nocdyn.write("none.csv", "t;n\n")
     nocdyn.write("back.csv", "t;n\n2;1\n1;2\n")
     nocdyn.write("bad.csv", "t;n\n0;1\n1;x\n2;2\n3;2\n")
     outcome = run(nocdyn, groups.replace(" {} /", " /"), 3 if "no.csv" in groups else 2)

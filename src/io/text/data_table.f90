@@ -2,31 +2,20 @@
 module nocdyn_data_table
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use nocdyn_kinds, only: wp
+  use nocdyn_line_messages, only: line_messages_t
   use nocdyn_literals, only: literal_malformed, literal_not_finite, literal_ok, number_problem, read_real
   use nocdyn_table_dialect, only: blanks, dialect_t, find_cells, find_dialect, find_lines, tab
-  use nocdyn_text, only: append, counted, lower_case, quoted, shortened, shown_path, string_t, to_text
+  use nocdyn_text, only: append, counted, lower_case, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: first_position
   implicit none (type, external)
   private
 
-  public :: line_messages_t, read_data_table, split_unit
-
-  integer, parameter :: most_messages = 5   !! a file of another format has as many errors as lines
+  public :: read_data_table, split_unit
 
   ! Where the headings of a table are.
   integer, parameter, public :: headings_first = 1   !! the first line that is not empty
   integer, parameter, public :: headings_above = 2   !! the line above the first row, if it has no number; it may begin with #
   integer, parameter, public :: headings_after_preamble = 3   !! the same, below lines that are unlike the last ones
-
-  !> Messages on the lines of a file: the first ones, and how many more there are.
-  type :: line_messages_t
-    character(len=:), allocatable :: file        !! its name in messages
-    integer :: errors = 0                        !! number of wrong lines
-    type(string_t), allocatable :: messages(:)   !! at most `most_messages`, and the number of the others
-  contains
-    procedure :: add => add_message
-    procedure :: close => close_messages
-  end type line_messages_t
 
   !> A table in a text. Rows with another number of cells than columns are among its rows: `row_problem` says so.
   type, public :: data_table_t
@@ -35,6 +24,7 @@ module nocdyn_data_table
     integer :: columns = 0
     integer :: rows = 0
     integer :: heading_line = 0                  !! line of the headings, 0 if there are none
+    character(len=:), allocatable :: doubt       !! why a line is none that looks like headings, e.g. "line 2 looks like ..."
     type(string_t), allocatable :: headings(:)   !! [columns], '' where there is none; with their units
     integer, allocatable :: lines(:)             !! number of the line of each row
     integer, allocatable, private :: firsts(:), lasts(:)        !! positions of the rows in the text
@@ -77,6 +67,7 @@ contains
     case default
       call find_sample(table, firsts, lasts, sample)
       call find_first_row(table, firsts, lasts, numbers, sample, first)
+      if (.not. allocated(table%headings)) call find_doubt(table, firsts, lasts, numbers, first)
     end select
     if (.not. allocated(table%headings)) call no_headings(table)
     table%rows = max(0, size(firsts) - first + 1)
@@ -214,6 +205,31 @@ contains
     stop = start - 1 + len_trim(table%text(start:stop))
     call take_headings(table, table%text(start:stop), numbers(from) - 1)
   end subroutine find_first_row
+
+  !> Finds a line farther above the first row that looks like headings: the line after it is then probably a wrong row.
+  subroutine find_doubt(table, firsts, lasts, numbers, first)
+    type(data_table_t), intent(inout) :: table
+    integer, intent(in) :: firsts(:), lasts(:), numbers(:)
+    integer, intent(in) :: first   !! of the first row
+    type(string_t), allocatable :: cells(:)
+    integer :: i, k
+
+    do i = first - 2, 1, -1
+      call take_headings(table, table%text(firsts(i):lasts(i)), numbers(i))
+      if (.not. allocated(table%headings)) cycle
+      deallocate (table%headings)
+      table%heading_line = 0
+      table%doubt = 'line ' // to_text(numbers(i)) // ' looks like headings, but line ' // to_text(numbers(i + 1)) // &
+                    ' is no row of numbers'
+      call split_texts(table%text(firsts(i + 1):lasts(i + 1)), table%dialect, cells)
+      do k = 1, size(cells)
+        if (is_number(table, cells(k)%text) .or. scan(cells(k)%text, '0123456789') /= 1) cycle
+        table%doubt = table%doubt // ': ' // quoted(shortened(cells(k)%text))
+        exit
+      end do
+      return
+    end do
+  end subroutine find_doubt
 
   !> Takes a line as headings if it has one for each column and no number.
   subroutine take_headings(table, content, line)
@@ -463,32 +479,5 @@ contains
     name = trim(heading(:bracket - 1))
     unit = trim(adjustl(heading(bracket + 1:len_trim(heading) - 1)))
   end subroutine split_unit
-
-  !> Counts a message on a line; the first ones are kept.
-  subroutine add_message(self, line, text)
-    class(line_messages_t), intent(inout) :: self
-    integer, intent(in) :: line            !! its number, 0 for the file as a whole
-    character(len=*), intent(in) :: text
-
-    if (.not. allocated(self%messages)) allocate (self%messages(0))
-    self%errors = self%errors + 1
-    if (self%errors > most_messages) return
-    if (line > 0) then
-      call append(self%messages, shown_path(self%file) // ':' // to_text(line) // ': ' // text)
-    else
-      call append(self%messages, shown_path(self%file) // ': ' // text)
-    end if
-  end subroutine add_message
-
-  !> The messages, with the number of those that are not kept; of a file that is not a text only this.
-  subroutine close_messages(self, messages)
-    class(line_messages_t), intent(inout) :: self
-    type(string_t), allocatable, intent(out) :: messages(:)
-
-    if (.not. allocated(self%messages)) allocate (self%messages(0))
-    if (self%errors > most_messages) call append(self%messages, shown_path(self%file) // ': ' // &
-                                                 to_text(self%errors - most_messages) // ' more lines are wrong')
-    call move_alloc(self%messages, messages)
-  end subroutine close_messages
 
 end module nocdyn_data_table

@@ -1,11 +1,12 @@
 !> Files of recorders: the columns that a group names become its lists. Rows with missing values are left out and counted.
 module nocdyn_record_reader
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-  use nocdyn_data_table, only: data_table_t, headings_after_preamble, line_messages_t, read_data_table, split_unit
+  use nocdyn_data_table, only: data_table_t, headings_after_preamble, read_data_table, split_unit
   use nocdyn_diagnostics, only: diagnostics_t
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_input, only: group_t, value_t
   use nocdyn_kinds, only: wp
+  use nocdyn_line_messages, only: line_messages_t
   use nocdyn_near_words, only: near_match
   use nocdyn_raw_group, only: raw_group_t
   use nocdyn_schema_rules, only: anything, size_limit
@@ -73,7 +74,9 @@ contains
       call record%report(group, 'file', shown_path(record%path) // ': not a text file', diagnostics)
     else
       call read_data_table(text, headings_after_preamble, 0, record%table)
-      call record%find_columns(group, diagnostics)
+      if (record%table%rows == 0) call record%report(group, 'file', shown_path(record%path) // ' has no row of numbers', &
+                                                     diagnostics)
+      if (diagnostics%count == errors) call record%find_columns(group, diagnostics)
       if (diagnostics%count == errors) call record%take_columns(group, diagnostics)
     end if
     if (diagnostics%count > errors) call leave_out(group, record%source)
@@ -157,6 +160,9 @@ contains
     if (name == '') then
       call self%report(group, 'file', file // ' has ' // to_text(self%table%columns) // ' columns; needed: ' // &
                        to_text(absent) // ' at least, or ' // key, diagnostics)
+    else if (allocated(self%table%doubt)) then
+      call self%report(group, key, 'there is no column ' // quoted(shortened(name)) // ' in ' // file // ': ' // &
+                       self%table%doubt, diagnostics)
     else if (self%table%heading_line == 0) then
       call self%report(group, key, 'there is no column ' // quoted(shortened(name)) // ' in ' // file // &
                        ', which has no headings; allowed: numbers from 1 to ' // to_text(self%table%columns), diagnostics)

@@ -1,9 +1,10 @@
 !> Tables in files that an input names: the table of an element has two columns, of which the first ascends; a list of variants
 !> begins with the names of its columns. How columns are separated: `nocdyn_table_dialect`.
 module nocdyn_table_file
-  use nocdyn_data_table, only: data_table_t, headings_above, headings_first, line_messages_t, read_data_table
+  use nocdyn_data_table, only: data_table_t, headings_above, headings_first, read_data_table
   use nocdyn_errors, only: error_t, exit_file, exit_input
   use nocdyn_kinds, only: wp
+  use nocdyn_line_messages, only: line_messages_t
   use nocdyn_schema_rules, only: anything, size_limit
   use nocdyn_text, only: append, counted, quoted, shortened, string_t, to_text
   use nocdyn_text_file, only: read_text_file
