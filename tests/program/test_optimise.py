@@ -172,6 +172,47 @@ def test_no_choice_keeps_limits(nocdyn):
     assert [row["best"] for row in rows].index("yes") == ratios.index(min(ratios))
 
 
+def test_input_better_than_choices(nocdyn):
+    """A note names the number of the input that is not to be had, and steps that do not reach the highest value."""
+    nocdyn.write("sizes.csv", SIZES.replace("250", "400"))
+    own = PUMP.replace("coupling.rubber.size' /", "coupling.rubber.size' sizes = '25' /")
+    assert optimise(nocdyn, own)["notes"] == []
+    report = optimise(nocdyn, own, "--set", "design(2).step=5", "--set", "design(2).low=1.6")
+    peak = report["objectives"][0]
+    assert peak["before"] < peak["best"]
+    first, steps = report["notes"]
+    assert first.startswith(f"the input is better than the best choice, moment_rubber_peak {peak['before']:.7g} against ")
+    assert first.endswith(": body.pump.inertia = 1.5 is not among its values")
+    assert steps == "body.pump.inertia has one value only, low = 1.6: the step is larger than the range to high = 1.8"
+    report = optimise(nocdyn, own, "--set", "design(2).step=0.4")
+    assert "the steps from low = 1.2 do not reach high = 1.8; its highest value is 1.6" in report["notes"][-1]
+    report = optimise(nocdyn, own, "--set", "design(1).sizes='10'", "--set", "design(2).low=1.6", "--set", "design(2).step=0.2")
+    assert "it exceeds limits less" in report["notes"][0]
+    assert "coupling.rubber.size = '25' is not among its sizes; body.pump.inertia = 1.5 is not" in report["notes"][0]
+    between = DAMPER.format(mass=0.2, stiffness=1e4, link=0.0, low=30, high=200).replace("low = 0.5", "low = 60")
+    report = optimise(nocdyn, between, "--set", "coupling.link.damping=9")
+    assert "coupling.link.damping = 9 is not from 60 to 500" in report["notes"][0]
+
+
+def test_load_cases_without_design(nocdyn):
+    """What a file lacks is said once, not of each load case."""
+    cases = "&load_case name = 'a' set = 'load.water.quadratic=0.01' /\n&load_case name = 'b' set = 'load.water.quadratic=0.02' /\n"
+    nocdyn.write("sizes.csv", SIZES)
+    nocdyn.write("a.nml", "".join(line for line in PUMP.splitlines(True) if "&design" not in line) + cases)
+    result = nocdyn("optimise", "a.nml")
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
+    assert "a.nml: there is no group &design" in result.stderr
+    assert not (nocdyn.folder / "results").exists()
+
+
+def test_no_choice_has_results(nocdyn):
+    text = DAMPER.format(mass=0.2, stiffness=1e4, link=0.0, low=30, high=200)
+    nocdyn.write("a.nml", text.replace("response = 'shaft' statistic = 'peak'", "quantity = 'omega_disc' statistic = 'final'"))
+    result = nocdyn("optimise", "a.nml", "--set", "run.max_steps=2")
+    assert result.returncode == 1
+    assert result.stderr.startswith("nocdyn: a.nml: no choice gives the objectives: the integration stopped at ")
+
+
 @pytest.mark.parametrize(
     ("former", "new", "message"),
     [
@@ -186,6 +227,12 @@ def test_no_choice_keeps_limits(nocdyn):
         ("coupling.rubber.size' /", "coupling.crank.size' /", "coupling 'crank' has no catalogue"),
         ("coupling.rubber.size' /", "coupling.gum.size' /", "there is no &coupling 'gum'"),
         ("coupling.rubber.size' /", "coupling.rubber.size' sizes = '16', '17' /", "the catalogue has no size '17'"),
+        (
+            "coupling.rubber.size' /",
+            "coupling.rubber.size' low = 1 high = 2 /",
+            "a.nml:11: &design: low = 1: 'coupling.rubber.size' is no number, but a size of a catalogue; allowed: sizes",
+        ),
+        ("coupling.rubber.size' /", "coupling.rubber.size' values = 3, 4 /", "values = 3: 'coupling.rubber.size' is no number"),
         ("step = 0.3", "step = 1e-9", "step = 1e-09 gives more than 10000 values"),
         ("low = 1.2 high = 1.8 step = 0.3", "", "no values; needed: low and high, or values"),
         ("low = 1.2 high = 1.8 step = 0.3", "low = -1 high = 1", "low: "),

@@ -17,7 +17,7 @@ module nocdyn_design_choices
     logical :: is_logarithmic = .false.     !! whether it is searched by its logarithm
     real(wp), allocatable :: values(:)
   contains
-    procedure :: at, share_of
+    procedure :: at, has => has_number, share_of
   end type design_number_t
 
   !> One size of a catalogue that is chosen.
@@ -25,6 +25,8 @@ module nocdyn_design_choices
     integer :: group = 0                        !! &coupling in the input
     character(len=:), allocatable :: path       !! 'coupling.rubber.size'
     type(string_t), allocatable :: sizes(:)
+  contains
+    procedure :: has => has_size
   end type design_size_t
 
   integer, parameter :: most_values = 10000           ! of one number
@@ -84,6 +86,7 @@ contains
     integer :: i, k
 
     self%path = input%groups(g)%text('target')
+    call refuse_numbers(input, g, diagnostics)
     name = self%path(len(coupling) + 1:len(self%path) - len(size_key))
     do i = 1, size(input%groups)
       if (input%groups(i)%kind == 'coupling' .and. input%groups(i)%name == name) self%group = i
@@ -107,6 +110,26 @@ contains
       call input%report(g, 'sizes', 'sizes: the catalogue has no size ' // quoted(self%sizes(i)%text), diagnostics)
     end do
   end subroutine read_size
+
+  !> Refuses what only a number has: a size is one of a catalogue.
+  subroutine refuse_numbers(input, g, diagnostics)
+    type(input_t), intent(in) :: input
+    integer, intent(in) :: g   !! &design
+    type(diagnostics_t), intent(inout) :: diagnostics
+    character(len=*), parameter :: keys(*) = [character(len=6) :: 'low', 'values']   ! the others require low
+    character(len=:), allocatable :: key
+    real(wp), allocatable :: values(:)
+    integer :: i
+
+    do i = 1, size(keys)
+      key = trim(keys(i))
+      if (.not. input%groups(g)%has_value(key)) cycle
+      allocate (values, source=input%groups(g)%numbers(key))
+      call input%report(g, key, key // ' = ' // to_text(values(1)) // ': ' // quoted(input%groups(g)%text('target')) // &
+                        ' is no number, but a size of a catalogue; allowed: sizes, or none of these keys', diagnostics)
+      return
+    end do
+  end subroutine refuse_numbers
 
   subroutine read_number(input, g, self, diagnostics)
     type(input_t), intent(in) :: input
@@ -148,6 +171,27 @@ contains
       call read_free_number(input, g, low, high, .not. self%is_continuous, self, diagnostics)
     end associate
   end subroutine read_number
+
+  !> Whether a value may be chosen.
+  pure logical function has_number(self, value)
+    class(design_number_t), intent(in) :: self
+    real(wp), intent(in) :: value
+
+    if (self%is_continuous) then
+      has_number = value >= self%low .and. value <= self%high
+    else
+      has_number = any(abs(self%values - value) <= rounding * abs(value))
+    end if
+  end function has_number
+
+  !> Whether a size may be chosen.
+  pure logical function has_size(self, name)
+    class(design_size_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+    integer :: i
+
+    has_size = any([(self%sizes(i)%text == name, i=1, size(self%sizes))])
+  end function has_size
 
   !> The value at a share of the way from low to high.
   pure real(wp) function at(self, share)

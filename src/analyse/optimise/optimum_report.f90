@@ -2,16 +2,17 @@
 module nocdyn_optimum_report
   use nocdyn_column_names, only: with_unit
   use nocdyn_csv, only: text_cell
+  use nocdyn_design_choices, only: design_number_t
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_kinds, only: wp
   use nocdyn_lapack, only: ascending_order
-  use nocdyn_minimax, only: kept
+  use nocdyn_minimax, only: is_better, kept
   use nocdyn_optimum_search, only: candidate_t, optimum_t
   use nocdyn_output_file, only: output_file_t
   use nocdyn_report_openings, only: append_notes, open_analysis_report
   use nocdyn_table_text, only: cell, padded, text_width
-  use nocdyn_text, only: append, counted, rounded_text, to_text
+  use nocdyn_text, only: append, counted, quoted, rounded_text, string_t, to_text
   use nocdyn_text_buffer, only: text_buffer_t
   implicit none (type, external)
   private
@@ -33,9 +34,13 @@ contains
     active = ''
     broken = ''
     associate (best => self%candidates(self%best))
+      if (is_better(self%before%point, best%point)) call append_if_worse(self)
       do i = 1, size(self%numbers)
         associate (one => self%numbers(i), value => best%values(i))
-          if (.not. one%is_continuous) cycle
+          if (.not. one%is_continuous) then
+            call append_steps(one, self%notes)
+            cycle
+          end if
           if (value - one%low <= at_end * (one%high - one%low)) then
             call append(self%notes, one%path // ' is at its bound low = ' // to_text(one%low) // &
                                     ': a better one may lie beyond')
@@ -61,6 +66,58 @@ contains
       if (failed > 0) call append(self%notes, counted(failed, 'combination gives', 'combinations give') // ' no objective')
     end associate
   end subroutine list_optimum_notes
+
+  !> A note of steps that do not reach the highest value.
+  subroutine append_steps(number, notes)
+    type(design_number_t), intent(in) :: number   !! one of a list of values
+    type(string_t), allocatable, intent(inout) :: notes(:)
+
+    if (maxval(number%values) >= number%high) return
+    if (size(number%values) == 1) then
+      call append(notes, number%path // ' has one value only, low = ' // to_text(number%low) // &
+                  ': the step is larger than the range to high = ' // to_text(number%high))
+    else
+      call append(notes, number%path // ': the steps from low = ' // to_text(number%low) // ' do not reach high = ' // &
+                  to_text(number%high) // '; its highest value is ' // to_text(maxval(number%values)))
+    end if
+  end subroutine append_steps
+
+  !> A note that the input is better than the best choice, and why it is none of the choices.
+  subroutine append_if_worse(self)
+    type(optimum_t), intent(inout) :: self
+    real(wp), parameter :: rounding = 1.0e-9_wp   ! of goals
+    character(len=:), allocatable :: note, why
+    integer :: i
+
+    associate (best => self%candidates(self%best), before => self%before)
+      note = 'the input is better than the best choice'
+      if (before%point%excess() > 0 .or. best%point%excess() > 0) then
+        note = note // ', it exceeds limits less'
+      else
+        associate (i => maxloc(before%point%goal, dim=1), least => rounding * abs(best%point%worst()))
+          if (best%point%worst() - before%point%worst() <= least) return
+          note = note // ', ' // self%objectives(i)%label // ' ' // &
+                 rounded_text(self%objectives(i)%value(before%point%goal(i)), 7) // ' against ' // &
+                 rounded_text(self%objectives(i)%value(best%point%goal(i)), 7)
+        end associate
+      end if
+      why = ''
+      do i = 1, size(self%sizes)
+        if (self%sizes(i)%has(before%sizes(i)%text)) cycle
+        why = why // '; ' // self%sizes(i)%path // ' = ' // quoted(before%sizes(i)%text) // ' is not among its sizes'
+      end do
+      do i = 1, size(self%numbers)
+        associate (one => self%numbers(i))
+          if (one%has(before%values(i))) cycle
+          why = why // '; ' // one%path // ' = ' // to_text(before%values(i))
+          if (one%is_continuous) why = why // ' is not from ' // to_text(one%low) // ' to ' // to_text(one%high)
+          if (.not. one%is_continuous) why = why // ' is not among its values'
+        end associate
+      end do
+      if (why == '') why = '; the search did not find it, more --starts may'
+    end associate
+    call append(self%notes, note // ': ' // why(3:))
+  end subroutine append_if_worse
 
   !> "98.2 %" of a limit.
   function ratio_text(candidate, bound) result(text)

@@ -95,11 +95,11 @@ contains
       end if
     end do
     if (self%best == 0) then
-      call raise(error, exit_failed, 'no choice gives the objectives: ' // reason)
+      call raise(error, exit_failed, input%shown_case() // ': no choice gives the objectives: ' // reason)
       return
     end if
     call take_best(input, self, message)
-    if (message /= '') call raise(error, exit_failed, message)
+    if (message /= '') call raise(error, exit_failed, input%shown_case() // ': ' // message)
   end subroutine search_optimum
 
   !> Refuses searches that would not end.

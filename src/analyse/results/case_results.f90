@@ -6,7 +6,7 @@ module nocdyn_case_results
   implicit none (type, external)
   private
 
-  public :: combine_verdicts, is_complete, put_cases
+  public :: combine_verdicts, is_complete, put_cases, same_refusal
 
   character(len=*), parameter, public :: status_done = 'done', status_refused = 'refused', status_failed = 'failed'
 
@@ -71,5 +71,14 @@ contains
     end do
     call json%close_list()
   end subroutine put_cases
+
+  !> Whether all load cases are refused by the same words, which are those of the file then.
+  pure logical function same_refusal(results)
+    type(case_result_t), intent(in) :: results(:)
+    integer :: k
+
+    same_refusal = all(results%status == status_refused)
+    if (same_refusal) same_refusal = all([(results(k)%message == results(1)%message, k=2, size(results))])
+  end function same_refusal
 
 end module nocdyn_case_results

@@ -3,7 +3,7 @@ module nocdyn_analysis_command
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_arguments, only: arguments_t
   use nocdyn_case_choice, only: find_wanted, wanted_case
-  use nocdyn_case_results, only: case_result_t, combine_verdicts, put_cases, status_failed, status_refused
+  use nocdyn_case_results, only: case_result_t, combine_verdicts, put_cases, same_refusal, status_failed, status_refused
   use nocdyn_command_analyses, only: new_command_analysis
   use nocdyn_companion_command, only: become_companion
   use nocdyn_console, only: print_text, report_error
@@ -157,9 +157,10 @@ contains
       end associate
       if (is_interrupted() .and. allocated(reading%error) .and. .not. kind%keeps_journal) reading%error%message = words
       if (.not. allocated(reading%error)) cycle
-      call report_error(reading%error, code)
+      if (k == 1 .or. .not. same_refusal(results(:k))) call report_error(reading%error, code)
       deallocate (reading%error)
     end do
+    if (size(results) > 1 .and. same_refusal(results)) return   ! of the file, which has no results
     call conclude(arguments, reading, results, code)
   end subroutine analyse_file
 
