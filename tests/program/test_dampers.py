@@ -1,7 +1,9 @@
 """Torsional vibration dampers by their data sheets: the machines that they stand for, the optimum of Houdaille's damper, heat."""
 
 import csv
+import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -70,6 +72,32 @@ def test_a_damper_is_a_body_and_a_coupling(nocdyn, keys, command):
     for name, (header, values) in tables[0].items():
         assert header == tables[1][name][0]
         assert values == pytest.approx(tables[1][name][1], rel=1e-9, abs=1e-11 * np.max(abs(values)))
+
+
+@pytest.mark.parametrize("keys", DAMPERS)
+def test_check_tells_what_a_damper_comes_to(nocdyn, keys):
+    by_hand = dict(re.findall(r"(\w+) = (\S+)", DAMPERS[keys]))
+    stiffness, damping, psi = (float(by_hand.get(key, 0)) for key in ("stiffness", "damping", "relative_damping"))
+    if psi:
+        damping = psi / (2 * math.pi) * stiffness / float(by_hand["damping_frequency"])
+    text = f"&damper name = 'ring' body = 'engine' ring_inertia = 2.0 housing_inertia = 0.5 {keys} /\n"
+    nocdyn.write("machine.nml", MACHINE.format(engine=3.0, damper=text + "&limit damper = 'ring' heat = 100 /"))
+    printed = nocdyn("check", "machine.nml", "--out", "out").stdout
+    (damper,) = json.loads((nocdyn.folder / "out/check.json").read_text())["dampers"]
+    assert (damper["name"], damper["body"], damper["ring_inertia_kg_m2"], damper["housing_inertia_kg_m2"]) == ("ring", "engine", 2, 0.5)
+    wanted = [stiffness, damping, math.sqrt(stiffness / 2.0)]
+    keys = ("stiffness_N_m_rad", "damping_N_m_s_rad", "tuning_frequency_rad_s")
+    assert [damper[key] for key in keys] == pytest.approx(wanted, rel=1e-9)
+    (line,) = [line.split() for line in printed.splitlines() if line.startswith("  ring, ")]
+    assert [float(word) for word in line[2:]] == pytest.approx([2, *wanted[:2], wanted[2] / (2 * math.pi)], rel=1e-6)
+    sheet = (nocdyn.folder / "out/mass_elastic.csv").read_text()  # a machine with its modes
+    assert "not in this sheet: damper" not in sheet
+    assert nocdyn("import", "out/mass_elastic.csv", "--out", "again.nml").returncode == 0
+    modes = []
+    for file in ("machine.nml", "again.nml"):
+        assert nocdyn("modes", file, "--at", "rest", "--out", "out").returncode == 0
+        modes.append([one["undamped_frequency_Hz"] for one in json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]])
+    assert modes[0] == pytest.approx(modes[1], rel=1e-9, abs=1e-6)
 
 
 def houdaille(zeta):

@@ -1,6 +1,7 @@
 !> check.json: the mass-elastic data of a machine, and its input.
 module nocdyn_check_file
   use nocdyn_bank, only: bank_of
+  use nocdyn_damper_report, only: put_dampers
   use nocdyn_element_sets, only: element_names, whole_names, wholes
   use nocdyn_errors, only: error_t
   use nocdyn_formulation, only: formulation_t
@@ -66,6 +67,7 @@ contains
     end associate
     call json%close_list()
     call put_couplings(json, machine)
+    call put_dampers(json, input, machine)
     call put_shafts(json, input, machine)
     call put_constraints(json, machine)
     if (allocated(input%load_cases)) then

@@ -1,6 +1,7 @@
 !> The mass-elastic sheet of a machine, a table with a row for each body and the coupling, shaft or gear from it to another one;
 !> `nocdyn import` reads it. Numbers have all their digits, in SI units.
 module nocdyn_mass_elastic_sheet
+  use nocdyn_derived_values, only: derive_values
   use nocdyn_input, only: group_t, input_t, value_t
   use nocdyn_kinds, only: wp
   use nocdyn_output_file, only: output_file_t
@@ -32,9 +33,10 @@ module nocdyn_mass_elastic_sheet
 contains
 
   !> Writes the sheet. Comments at its head say what it does not hold.
-  subroutine put_sheet(input, file)
-    type(input_t), intent(in) :: input
+  subroutine put_sheet(given, file)
+    type(input_t), intent(in) :: given
     type(output_file_t), intent(inout) :: file
+    type(input_t), allocatable :: input   ! with the numbers of dampers and rubber couplings that follow from others
     integer, allocatable :: bodies(:)
     integer :: b, c, g
     logical :: is_first
@@ -42,8 +44,10 @@ contains
     type(connection_t), allocatable :: connections(:)
     type(string_t), allocatable :: missing(:)
 
-    call file%put('# Mass-elastic data of ' // input%shown_file() // ', nocdyn ' // version // new_line('a'))
-    call left_out(input, missing)
+    allocate (input, source=given)
+    call derive_values(input)
+    call file%put('# Mass-elastic data of ' // given%shown_file() // ', nocdyn ' // version // new_line('a'))
+    call left_out(given, missing)
     do g = 1, size(missing)
       call file%put('# not in this sheet: ' // missing(g)%text // new_line('a'))
     end do
@@ -89,7 +93,7 @@ contains
     do g = 1, size(input%groups)
       associate (group => input%groups(g))
         select case (group%kind)
-        case ('case', 'run', 'output', 'sweep', 'vary', 'record', 'load_case', 'response', 'transit', 'orbit')
+        case ('case', 'run', 'output', 'sweep', 'vary', 'record', 'load_case', 'response', 'transit', 'orbit', 'damper')
           cycle
         case ('body')
           keys = other_keys(group, body_keys)

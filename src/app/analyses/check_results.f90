@@ -3,6 +3,7 @@ module nocdyn_check_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_check_file, only: put_check
   use nocdyn_column_names, only: count_columns
+  use nocdyn_damper_report, only: damper_table
   use nocdyn_disk_room, only: bytes_text
   use nocdyn_errors, only: error_t
   use nocdyn_input, only: input_t
@@ -80,7 +81,8 @@ contains
     do i = 1, size(notes)
       sizes = sizes // new_line('a') // '  note: ' // notes(i)%text
     end do
-    self%report = machine_report(input%shown_file(), machine) // speed_table(input, machine) // sizes
+    self%report = machine_report(input%shown_file(), machine) // damper_table(input, machine) // &
+                  speed_table(input, machine) // sizes
     if (.not. options%writes_files) return
     self%machine = machine
     call left_out(input, notes)
