@@ -218,6 +218,12 @@ def test_no_choice_has_results(nocdyn):
     [
         ("&objective response = 'rubber' statistic = 'peak' /", "", "there is no group &objective"),
         ("response = 'rubber' statistic = 'peak'", "goal = 'minimise'", "&objective: no number is named"),
+        ("statistic = 'peak'", "statistic = 'curve'", "statistic(1) = 'curve' is not known; allowed: 'final', "),
+        (
+            "statistic = 'peak'",
+            "statistic = 'crossing'",
+            "does not belong to response; allowed: 'peak', 'peak_speed', 'margin', 'ratio', 'peak_frequency'\n",
+        ),
         ("response = 'rubber' statistic", "response = 'gum' statistic", "response = 'gum' is no coupling, shaft or mesh"),
         (
             "&design target = 'coupling.rubber.size' /\n&design target = 'body.pump.inertia' low = 1.2 high = 1.8 step = 0.3 /",
@@ -249,4 +255,5 @@ def test_refusals(nocdyn, former, new, message):
     result = nocdyn("optimise", "a.nml")
     assert result.returncode == 2
     assert message in result.stderr
+    assert "curve'" not in result.stderr.replace(new, "").replace("(1) = 'curve'", "")
     assert not (nocdyn.folder / "results").exists()

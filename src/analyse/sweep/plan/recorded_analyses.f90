@@ -21,6 +21,7 @@ module nocdyn_recorded_analyses
   use nocdyn_response_limits, only: read_limits, response_limit_t
   use nocdyn_moment_forms, only: list_moment_forms, kind_moment, moment_form_t
   use nocdyn_response_settings, only: read_response_settings, response_settings_t
+  use nocdyn_schema, only: kind_rules
   use nocdyn_schema_text, only: suggestion
   use nocdyn_text, only: append, quoted, string_t, to_text
   use nocdyn_units, only: unit_for, unit_hz, units
@@ -228,7 +229,7 @@ contains
       k = findloc(analysis_names == words(i)%text .and. analysis_owners == owner, .true., dim=1)
       if (k == 0) then
         call input%report(record, 'statistic', 'statistic = ' // quoted(words(i)%text) // ' does not belong to ' // owner // &
-                          '; allowed: ' // statistics_of(owner), diagnostics)
+                          '; allowed: ' // statistics_of(owner, input%groups(record)%kind), diagnostics)
         cycle
       end if
       if (owner == 'mode') then
@@ -275,14 +276,16 @@ contains
   end subroutine add_orbit
 
   !> "'peak', 'peak_speed'".
-  function statistics_of(owner) result(text)
+  function statistics_of(owner, kind) result(text)
     character(len=*), intent(in) :: owner
+    character(len=*), intent(in) :: kind   !! of the group that names one: an &objective has no curves
     character(len=:), allocatable :: text
     integer :: k
 
     text = ''
     do k = 1, size(analysis_names)
       if (analysis_owners(k) /= owner) cycle
+      if (.not. any(kind_rules%group == kind .and. kind_rules%word == analysis_names(k))) cycle
       if (text /= '') text = text // ', '
       text = text // quoted(trim(analysis_names(k)))
     end do

@@ -111,7 +111,6 @@ contains
     end if
     allocate (plan%design, source=list_design(origin))
     allocate (plan%trajectories(0))
-    call refuse_curves(input, kind, diagnostics)
     call read_quantities(kind, 1, plan, diagnostics, failure)
     call input%refuse(diagnostics, error)
     call add_error(error, failure)
@@ -136,23 +135,6 @@ contains
     call note_former_records(plan%input, reader, signals, plan%notes)
     call set_axis(plan%input, reader, plan%axis)
   end subroutine read_quantities
-
-  !> Refuses curves, where one number is needed.
-  subroutine refuse_curves(input, kind, diagnostics)
-    type(input_t), intent(in) :: input
-    character(len=*), intent(in) :: kind   !! of the groups
-    type(diagnostics_t), intent(inout) :: diagnostics
-    integer, allocatable :: groups(:)
-    integer :: i, k
-
-    allocate (groups, source=input%groups_named(kind))
-    do i = 1, size(groups)
-      associate (words => input%groups(groups(i))%texts('statistic'))
-        if (any([(words(k)%text == 'curve', k=1, size(words))])) call input%report(groups(i), 'statistic', &
-          "statistic = 'curve' has a number for each speed; needed: a statistic with one number", diagnostics)
-      end associate
-    end do
-  end subroutine refuse_curves
 
   !> What curves are over: the speeds of &response, or its frequencies.
   subroutine set_axis(input, reader, axis)

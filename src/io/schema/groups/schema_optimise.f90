@@ -11,6 +11,7 @@ module nocdyn_schema_optimise
   integer, parameter :: key = findloc(sweep_keys%group, 'record', dim=1), last_key = size(sweep_keys)
   integer, parameter :: trajectories = findloc(sweep_keys%name, 'trajectories', dim=1)   ! which an objective has not
   integer, parameter :: kind = findloc(sweep_kinds%group, 'record', dim=1), last_kind = size(sweep_kinds)
+  integer, parameter :: curve = findloc(sweep_kinds%word, 'curve', dim=1)                 ! of more than one number
   integer, parameter :: relation = findloc(sweep_relations%group, 'record', dim=1)
   integer, parameter :: relations = count(sweep_relations%group == 'record')
   integer :: i
@@ -21,7 +22,8 @@ module nocdyn_schema_optimise
     group_rule_t('design', in_fits, any_times, '', "A number that 'nocdyn optimise' may choose, or the size of a coupling.")]
 
   type(kind_rule_t), parameter, public :: optimise_kinds(*) = [ &
-    (kind_rule_t('objective', sweep_kinds(i)%word, sweep_kinds(i)%help), i=kind, last_kind)]
+    (kind_rule_t('objective', sweep_kinds(i)%word, sweep_kinds(i)%help), i=kind, curve - 1), &
+    (kind_rule_t('objective', sweep_kinds(i)%word, sweep_kinds(i)%help), i=curve + 1, last_kind)]
 
   type(key_rule_t), parameter, public :: optimise_keys(*) = [ &
     key_rule_t('objective', 'goal', a_word, 1, '', "'minimise'", goals, 'what is sought'), &
