@@ -114,7 +114,7 @@ contains
     else if (ratio < 0) then
       line%reason = line%reason // ': nocdyn response with a &limit judges it'
     else
-      line%reason = line%reason // ', and there is no &limit of ' // quoted(element) // ', which swings most'
+      line%reason = line%reason // ', and there is no &limit of the vibration of ' // quoted(element) // ', which swings most'
     end if
     call verdict%add(line)
   end subroutine add_critical
