@@ -413,6 +413,14 @@ def test_equal_frequencies_are_said_and_split(nocdyn):
         assert one["by"]["coupling.k1.stiffness"] * 2e4 * step == pytest.approx(frequency - one["value"], rel=1e-3, abs=1e-11)
 
 
+def test_a_range_without_modes_is_said_as_modes_says_it(nocdyn):
+    answers, report = sensitivity(nocdyn, TWINS, "--range_hz", "1000,2000")
+    printed = nocdyn("modes", "machine.nml", "--range_hz", "1000,2000").stdout
+    (note,) = [note for note in report["notes"] if "oscillating modes" in note]
+    assert (answers, note) == ([], "0 oscillating modes are from 1000 to 2000 Hz; of 3 undamped ones, 3 are below")
+    assert f"note: {note}\n" in printed
+
+
 RUBBER = TWINS.replace("'left' stiffness", "'left' kind = 'rubber'{} stiffness")
 
 

@@ -19,6 +19,7 @@ module nocdyn_mode_answers
   use nocdyn_lapack_complex, only: complex_eigenvectors
   use nocdyn_linearisation, only: find_slopes, has_turning_losses, held_elements
   use nocdyn_machine, only: machine_t
+  use nocdyn_mode_choice, only: note_choice
   use nocdyn_operating_point, only: find_operating_point, operating_point_t
   use nocdyn_number_changes, only: changed_machine_t, displacement_of, number_change_t
   use nocdyn_slopes, only: slopes_t
@@ -103,6 +104,8 @@ contains
         self%motion(i)%angle = pairs%angle(:, order(i))
       end do
     end associate
+    if (choice%has_range) call note_choice(choice, pencil%modes - pencil%rigid, max(0, wanted(1) - 1 - pencil%rigid), &
+                                           size(order), notes)
     allocate (self%answers(2 * size(order)))
     do i = 1, size(order)
       label = 'mode ' // to_text(i + max(0, wanted(1) - 1 - pencil%rigid))
