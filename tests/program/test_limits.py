@@ -34,7 +34,7 @@ def limited(nocdyn, *words):
         (
             MACHINE + TABLE.format("20000*x"),
             20_000,
-            ":5: &excitation 'e': table_time(1) = x is not a number; allowed: any value [s]",
+            ":5: &excitation 'e': table_time(1) = x is not a number; allowed: a finite number [s]",
         ),
         (
             "&body name='a' inertia=1\n" + "".join(f"key{i}=1\n" for i in range(20_000)) + "/\n&run t_end=1 /\n",

@@ -241,6 +241,7 @@ def test_no_choice_has_results(nocdyn):
         ("coupling.rubber.size' /", "coupling.rubber.size' values = 3, 4 /", "values = 3: 'coupling.rubber.size' is no number"),
         ("step = 0.3", "step = 1e-9", "step = 1e-09 gives more than 10000 values"),
         ("low = 1.2 high = 1.8 step = 0.3", "", "no values; needed: low and high, or values"),
+        ("low = 1.2 high", "low = nan high", "low = nan is not a finite number; allowed: a finite number"),
         ("low = 1.2 high = 1.8 step = 0.3", "low = -1 high = 1", "low: "),
         ("low = 1.2 high = 1.8 step = 0.3", "low = 1 high = 2 start = 3", "start = 3 is out of range; allowed: 1 to 2"),
         ("low = 1.2 high = 1.8 step = 0.3", "sizes = '10'", "sizes belong to a target such as 'coupling.rubber.size'"),

@@ -273,5 +273,5 @@ def test_numbers_with_a_unit_are_texts():
     machine["body.rotor.inertia"] = "2000 kg cm2"
     machine.check()
     machine.groups[0].inertia = "5 kg m"
-    with pytest.raises(package.InputError, match="'kg m' is a unit of kg m; needed: one of moment of inertia"):
+    with pytest.raises(package.InputError, match="'kg m' is no unit of moment of inertia; needed: one of that, such as kg m2"):
         package.Input(machine.text).check()

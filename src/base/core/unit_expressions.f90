@@ -120,7 +120,11 @@ contains
     integer, parameter :: rad = 5   ! in `base_units`
     integer :: difference(size(base_units))
 
-    message = quoted(shortened(text)) // ' is a unit of ' // quantity_of(given) // '; needed: one of ' // quantity_of(wanted)
+    if (named_quantity(given) > 0) then
+      message = quoted(shortened(text)) // ' is a unit of ' // quantity_of(given) // '; needed: one of ' // quantity_of(wanted)
+    else
+      message = quoted(shortened(text)) // ' is no unit of ' // quantity_of(wanted) // '; needed: one of that'
+    end if
     if (target /= '') message = message // ', such as ' // target
     difference = wanted%dimension - given%dimension
     if (any(difference /= 0 .and. [1, 2, 3, 4, rad, 6] /= rad)) return
@@ -131,19 +135,29 @@ contains
     end if
   end function dimension_message
 
+  !> The quantity of `quantity_names` that has a unit, 0: none of them.
+  integer function named_quantity(unit) result(i)
+    type(unit_expression_t), intent(in) :: unit
+    type(unit_expression_t) :: named
+    character(len=:), allocatable :: message
+
+    do i = size(quantity_names), 1, -1
+      call read_unit(quantity_names(i)%unit, named, message)
+      if (all(named%dimension == unit%dimension)) return
+    end do
+  end function named_quantity
+
   !> 'torsional stiffness', or the dimension in base units.
   function quantity_of(unit) result(text)
     type(unit_expression_t), intent(in) :: unit
-    character(len=:), allocatable :: text, message
-    type(unit_expression_t) :: named
+    character(len=:), allocatable :: text
     integer :: i
 
-    do i = 1, size(quantity_names)
-      call read_unit(quantity_names(i)%unit, named, message)
-      if (any(named%dimension /= unit%dimension)) cycle
+    i = named_quantity(unit)
+    if (i > 0) then
       text = trim(quantity_names(i)%name)
       return
-    end do
+    end if
     text = ''
     do i = 1, size(base_units)
       if (unit%dimension(i) == 0) cycle

@@ -12,7 +12,7 @@ module nocdyn_schema_text
   implicit none (type, external)
   private
 
-  public :: allowed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys
+  public :: allowed_text, needed_text, number_text, type_text, only_if_text, listed_keys, group_names, key_names, similar_keys
   public :: suggest, suggest_group, suggest_key, suggestion
 
   integer, parameter :: kept_digits = 14   ! of a number that is converted
@@ -52,6 +52,17 @@ contains
       text = 'any text'
     end select
   end function allowed_text
+
+  !> The same, of a value that is no number or not a finite one.
+  function needed_text(rule, unit) result(text)
+    type(key_rule_t), intent(in) :: rule
+    integer, intent(in), optional :: unit   !! as in `allowed_text`
+    character(len=:), allocatable :: text
+    character(len=*), parameter :: anything = 'any value'
+
+    text = allowed_text(rule, unit)
+    if (index(text, anything) == 1) text = 'a finite number' // text(len(anything) + 1:)
+  end function needed_text
 
   !> "> 0", ">= 2", "1e-14 to 0.1", '' if all is allowed.
   function range_text(allowed, unit) result(text)

@@ -9,7 +9,7 @@ module nocdyn_targets
   use nocdyn_schema_relations, only: relation_t, relations_of, relations_t
   use nocdyn_schema_rules, only: allowed_t, an_integer, at_most_one, exactly_one, is_out_of_range, less_than, &
     required, requires, unset
-  use nocdyn_schema_text, only: allowed_text
+  use nocdyn_schema_text, only: allowed_text, needed_text
   use nocdyn_schema_units, only: name_in_unit, unit_name
   use nocdyn_target_search, only: search_target
   use nocdyn_text, only: to_text
@@ -114,7 +114,7 @@ contains
     number = value
     if (target%is_integer) number = anint(value)
     if (.not. ieee_is_finite(number)) then
-      message = target%path // ' is not a finite number; allowed: ' // allowed_text(key_rules(target%rule), target%in_unit)
+      message = target%path // ' is not a finite number; allowed: ' // needed_text(key_rules(target%rule), target%in_unit)
       return
     end if
     written = to_text(number)

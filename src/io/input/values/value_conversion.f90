@@ -10,7 +10,7 @@ module nocdyn_value_conversion
   use nocdyn_schema, only: holds_texts, key_rules, words_of
   use nocdyn_schema_rules, only: a_body, a_document, a_file, a_flag, a_folder, a_line_file, a_name, a_number, a_selector, &
     a_word, an_integer, ground, is_out_of_range, key_rule_t, longest_name, size_limit, unset
-  use nocdyn_schema_text, only: allowed_text
+  use nocdyn_schema_text, only: allowed_text, needed_text
   use nocdyn_schema_units, only: name_in_unit, path_key, takes_units, unit_name
   use nocdyn_near_words, only: nearest_word
   use nocdyn_text, only: counted, is_too_long, joined, longest_file_name, longest_path, lower_case, quoted, &
@@ -162,7 +162,7 @@ contains
         call read_logical(raw%text, value%flags(i), status)
         if (status /= literal_ok) message = ' is neither true nor false'
       end select
-      if (message /= '') message = message // '; allowed: ' // allowed_text(rule, raw%unit)
+      if (message /= '') message = message // '; allowed: ' // needed_text(rule, raw%unit)
     end if
   end subroutine convert_value
 
@@ -224,7 +224,7 @@ contains
       message = ' has a unit as ' // name_in_unit(rule, raw%unit) // ' has; allowed: a number, or ' // &
                 name_in_unit(rule, 0) // ' = ' // quoted(shortened(trim(raw%text)))
     else if (number_problem(status) /= '') then
-      message = number_problem(status) // '; allowed: ' // allowed_text(rule)
+      message = number_problem(status) // '; allowed: ' // needed_text(rule)
     else
       call find_conversion(adjustl(raw%text(last + 1:)), unit, conversion, message)
       if (message /= '') then
