@@ -182,6 +182,7 @@ class Train:
             f"{ends['name']}: a shaft with distributed inertia, by the wave equation; openTorsion has one finite element"
         )
         self.machine.note(f"{ends['name']}: shear modulus {SHEAR_MODULUS:g} Pa, which openTorsion takes for all shafts")
+        self.machine.note(f"{ends['name']}: length and diameters are taken in mm, as openTorsion takes them")
         if "density" not in element:
             self.machine.note(f"{ends['name']}: density is not given; {DENSITY:g} kg/m3, as openTorsion takes it")
         if element.get("damping"):

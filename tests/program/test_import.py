@@ -138,8 +138,13 @@ def test_a_continuous_shaft_of_opentorsion_is_one(nocdyn):
     machine["components"][1]["elements"][1] = shaft
     printed = imported(nocdyn, "mill.json", json.dumps(machine))
     assert "mill.spindle: density is not given; 8000 kg/m3, as openTorsion takes it" in printed
+    assert "mill.spindle: length and diameters are taken in mm, as openTorsion takes them" in printed
     text = (nocdyn.folder / "machine.nml").read_text()
     assert "lengths = '500 mm'  diameters = '90 mm'  bores = '10 mm'" in text
+    nocdyn("check", "machine.nml", "--out", "out")
+    (stiffness,) = json.loads((nocdyn.folder / "out/check.json").read_text())["shafts"][0]["stiffness_N_m_rad"]
+    opentorsion = pytest.importorskip("opentorsion")
+    assert stiffness == pytest.approx(opentorsion.Shaft(0, 1, L=500, odl=90, idl=10).k, rel=1e-12)
 
 
 def broken(**changes):
