@@ -84,7 +84,12 @@ def test_check_tells_what_a_damper_comes_to(nocdyn, keys):
     nocdyn.write("machine.nml", MACHINE.format(engine=3.0, damper=text + "&limit damper = 'ring' heat = 100 /"))
     printed = nocdyn("check", "machine.nml", "--out", "out").stdout
     (damper,) = json.loads((nocdyn.folder / "out/check.json").read_text())["dampers"]
-    assert (damper["name"], damper["body"], damper["ring_inertia_kg_m2"], damper["housing_inertia_kg_m2"]) == ("ring", "engine", 2, 0.5)
+    assert (damper["name"], damper["body"], damper["ring_inertia_kg_m2"], damper["housing_inertia_kg_m2"]) == (
+        "ring",
+        "engine",
+        2,
+        0.5,
+    )
     wanted = [stiffness, damping, math.sqrt(stiffness / 2.0)]
     keys = ("stiffness_N_m_rad", "damping_N_m_s_rad", "tuning_frequency_rad_s")
     assert [damper[key] for key in keys] == pytest.approx(wanted, rel=1e-9)
@@ -96,7 +101,9 @@ def test_check_tells_what_a_damper_comes_to(nocdyn, keys):
     modes = []
     for file in ("machine.nml", "again.nml"):
         assert nocdyn("modes", file, "--at", "rest", "--out", "out").returncode == 0
-        modes.append([one["undamped_frequency_Hz"] for one in json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]])
+        modes.append(
+            [one["undamped_frequency_Hz"] for one in json.loads((nocdyn.folder / "out/modes.json").read_text())["modes"]]
+        )
     assert modes[0] == pytest.approx(modes[1], rel=1e-9, abs=1e-6)
 
 

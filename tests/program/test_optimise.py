@@ -196,7 +196,9 @@ def test_input_better_than_choices(nocdyn):
 
 def test_load_cases_without_design(nocdyn):
     """What a file lacks is said once, not of each load case."""
-    cases = "&load_case name = 'a' set = 'load.water.quadratic=0.01' /\n&load_case name = 'b' set = 'load.water.quadratic=0.02' /\n"
+    cases = (
+        "&load_case name = 'a' set = 'load.water.quadratic=0.01' /\n&load_case name = 'b' set = 'load.water.quadratic=0.02' /\n"
+    )
     nocdyn.write("sizes.csv", SIZES)
     nocdyn.write("a.nml", "".join(line for line in PUMP.splitlines(True) if "&design" not in line) + cases)
     result = nocdyn("optimise", "a.nml")

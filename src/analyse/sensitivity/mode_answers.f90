@@ -8,7 +8,7 @@ module nocdyn_mode_answers
   use nocdyn_answers, only: answers_t
   use nocdyn_assembly, only: assemble_steady_machine
   use nocdyn_band_pencil, only: band_pencil_t, new_band_pencil
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_errors, only: error_t, exit_failed, exit_input, raise
   use nocdyn_frozen_motions, only: eigenvalue_change, frame_t, frozen_motion_t, new_frame, new_view, view_t
   use nocdyn_frozen_states, only: displacement_t, freeze_equilibrium, frozen_state_t, mean_laws_t
   use nocdyn_formulation, only: formulation_t
@@ -74,7 +74,7 @@ contains
     call find_state(input, at, machine, point, slopes, error)
     if (allocated(error)) return
     if (has_turning_losses(point%formulation)) then
-      call raise(error, exit_failed, 'the teeth of this machine lose power while it vibrates, which makes its matrices ' // &
+      call raise(error, exit_input, 'the teeth of this machine lose power while it vibrates, which makes its matrices ' // &
                  'unsymmetric: there are no derivatives of its modes')
       return
     end if

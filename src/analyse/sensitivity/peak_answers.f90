@@ -66,7 +66,7 @@ contains
     call build_formulation(input, formulation, settings, run_notes, error)
     if (allocated(error)) return
     if (formulation%joints%count > 0) then
-      call raise(error, exit_failed, input%shown_case() // ': --peaks: the peaks of a machine with joints that lock or move ' // &
+      call raise(error, exit_input, input%shown_case() // ': --peaks: the peaks of a machine with joints that lock or move ' // &
                  'have no derivatives here; allowed: couplings, gears and loads without clutches, freewheels, cranks and ' // &
                  'teeth with losses')
       return

@@ -2,7 +2,7 @@
 module nocdyn_sensitivity_results
   use nocdyn_analyses, only: analysis_options_t, analysis_t
   use nocdyn_answers, only: answer_t, differentiate, answers_group_t
-  use nocdyn_errors, only: error_t, exit_failed, raise
+  use nocdyn_errors, only: error_t, exit_input, raise
   use nocdyn_input, only: input_t
   use nocdyn_json, only: json_t
   use nocdyn_machine, only: machine_t
@@ -87,7 +87,7 @@ contains
     if (.not. allocated(machine%rubber)) return
     do r = 1, size(machine%rubber)
       if (.not. (machine%rubber(r)%needs_iteration() .or. machine%rubber(r)%by_frequency%are_given)) cycle
-      call raise(error, exit_failed, 'the stiffness of ' // quoted(machine%element_name(machine%rubber(r)%element)) // &
+      call raise(error, exit_input, 'the stiffness of ' // quoted(machine%element_name(machine%rubber(r)%element)) // &
                  ' follows from its frequency, its amplitude or its heat, which has no derivatives here; allowed: a ' // &
                  "coupling without tables over these, with condition = 'cold' or 'warm'")
       return
