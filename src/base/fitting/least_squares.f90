@@ -167,7 +167,7 @@ contains
     type(solution_t), intent(inout) :: solution
     type(damping_t), intent(inout) :: damping
     logical, intent(out) :: has_moved
-    real(wp), parameter :: rounding = 1.0e-9_wp
+    real(wp), parameter :: rounding = 1.0e-9_wp, most = 1.0e6_wp   ! gain, where nothing is promised at bounds
     type(error_t), allocatable :: error
     real(wp) :: change(size(step)), cost, promised, r(problem%count), x(size(step))
 
@@ -182,7 +182,11 @@ contains
     has_moved = cost < solution%cost
     if (damping%may_rise) has_moved = has_moved .or. cost <= (1.0_wp + rounding) * solution%cost
     if (has_moved) then
-      damping%gain = (solution%cost - cost) / max(promised, tiny(promised))
+      if (solution%cost - cost < most * promised) then
+        damping%gain = (solution%cost - cost) / promised
+      else if (solution%cost > cost) then
+        damping%gain = most
+      end if
       damping%lambda = damping%lambda * max(1.0_wp / 3.0_wp, 1.0_wp - (2.0_wp * min(damping%gain, 2.0_wp) - 1.0_wp)**3)
       damping%growth = 2.0_wp
       solution%x = x
