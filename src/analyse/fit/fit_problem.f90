@@ -46,12 +46,11 @@ contains
     if (allocated(error)) return
     self%count = count(unknowns%has_prior)
     do i = 1, size(self%comparisons)
-      self%count = self%count + size(self%comparisons(i)%residuals())
-    end do
-    do i = 1, size(self%comparisons)
-      if (size(self%comparisons(i)%residuals()) > 0) cycle
-      call input%report(self%measurements(i)%group, 'name', 'none of its values is where something is computed, and ' // &
-                        'none can be fitted', diagnostics)
+      associate (values => size(self%comparisons(i)%residuals()))
+        self%count = self%count + values
+        if (values == 0) call input%report(self%measurements(i)%group, 'name', 'none of its values is where something is ' // &
+                                           'computed, and none can be fitted', diagnostics)
+      end associate
     end do
     call input%refuse(diagnostics, error)
     if (allocated(error) .or. self%count >= size(unknowns)) return

@@ -42,6 +42,7 @@ contains
   !> Finds standard errors and notes. Measurements without deviations are as exact as their residuals say.
   subroutine conclude(self)
     class(machine_fit_t), intent(inout) :: self
+    character(len=:), allocatable :: line
     integer :: freedoms, i, k
 
     associate (solution => self%solution, n => size(self%unknowns))
@@ -80,8 +81,8 @@ contains
                                 'far from the start, which --starts 8 may find')
       end if
       do i = 1, size(self%after)
-        if (left_out(self%after(i)) /= '') call append(self%notes, quoted(self%after(i)%measurement%name) // ': ' // &
-                                                                   left_out(self%after(i)))
+        line = left_out(self%after(i))
+        if (line /= '') call append(self%notes, quoted(self%after(i)%measurement%name) // ': ' // line)
       end do
       if (.not. solution%has_converged) call append(self%notes, 'the fit has not converged: the values are the best so far')
     end associate

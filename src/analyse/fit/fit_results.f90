@@ -67,7 +67,7 @@ contains
     call note_starts(input, self%fit%unknowns, self%fit%notes)
     call solve_from_starts(problem, max(1, options%starts), self%fit, error)
     if (allocated(error)) then
-      if (index(error%message, input%shown_file()) /= 1) error%message = input%shown_case() // ': ' // error%message
+      call input%name_case(error)
       return
     end if
     call problem%evaluate(self%fit%solution%x, self%fit%solution%residuals, error)

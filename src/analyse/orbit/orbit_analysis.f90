@@ -108,7 +108,7 @@ contains
       call move_alloc(problem, self%problem)
       return
     end if
-    if (index(error%message, input%shown_case()) /= 1) error%message = input%shown_case() // ': ' // error%message
+    call input%name_case(error)
   end subroutine analyse_orbits
 
   !> Refuses what has no meaning for a machine that nothing excites.

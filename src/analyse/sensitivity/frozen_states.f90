@@ -94,22 +94,22 @@ contains
     type(frozen_state_t), intent(in) :: frozen
     type(displacement_t), intent(in), optional :: displacement
     real(wp), intent(in), optional :: step   !! of the number
+    real(wp) :: supply
 
     associate (elements => self%state%elements, t => [t_infinity])
       elements%angle(1, :) = frozen%state%twist
       elements%speed(1, :) = frozen%state%rate
       elements%internal%value(1, :) = frozen%internal
-      if (frozen%state%supply > 0) call supply_machine(self%machine, self%state, frozen%state%supply)
+      supply = frozen%state%supply
       if (present(displacement)) then
         if (.not. displacement%is_none) then
-          if (frozen%state%supply > 0) then
-            call supply_machine(self%machine, self%state, frozen%state%supply + step * displacement%supply)
-          end if
           elements%angle(1, :) = elements%angle(1, :) + step * displacement%twist
           elements%speed(1, :) = elements%speed(1, :) + step * displacement%rate
           elements%internal%value(1, :) = elements%internal%value(1, :) + step * displacement%internal
+          supply = supply + step * displacement%supply
         end if
       end if
+      if (frozen%state%supply > 0) call supply_machine(self%machine, self%state, supply)
       if (frozen%joints%count > 0) call frozen%joints%choose_modes(self%machine, self%state)
       call self%state%choose_branches(self%machine, t)
       call self%state%evaluate_elements(self%machine, t)

@@ -80,9 +80,8 @@ contains
     settings%atol = min(settings%atol, 0.01_wp * fine)
     call find_peaks(input, formulation, settings, span, from, peaks, error)
     if (.not. allocated(error)) call change_machines(input, keys, motion, numbers, notes, error)
+    if (.not. allocated(error)) call assemble_machine(input, wide, error, lanes)
     if (.not. allocated(error)) then
-      call assemble_machine(input, wide, error, lanes)
-      if (allocated(error)) return
       call motion%prepare(wide)
       settings%method = 'rk853'
       settings%rtol = usual

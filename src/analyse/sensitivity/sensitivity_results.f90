@@ -45,7 +45,7 @@ contains
     if (options%at /= '') at = options%at
     call refuse_rubber(machine, error)
     if (allocated(error)) then
-      error%message = input%shown_case() // ': ' // error%message
+      call input%name_case(error)
       return
     end if
     allocate (self%found%notes(0), self%found%answers(0))
@@ -53,7 +53,7 @@ contains
     call new_mode_answers(input, at, modes_choice_t(options%modes, options%has_range, options%range_hz), modes, &
                           self%found%notes, error)
     if (allocated(error)) then
-      error%message = input%shown_case() // ': ' // error%message
+      call input%name_case(error)
       return
     end if
     count = 1
@@ -66,7 +66,7 @@ contains
     end if
     call differentiate(input, machine, self%found%keys, groups(:count), self%found%notes, error)
     if (allocated(error)) then
-      error%message = input%shown_case() // ': ' // error%message
+      call input%name_case(error)
       return
     end if
     if (options%has_peaks) then

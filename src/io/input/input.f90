@@ -38,6 +38,7 @@ module nocdyn_input
     procedure :: title
     procedure :: shown_file     !! the path for messages
     procedure :: shown_case     !! the path and the load case for messages
+    procedure :: name_case      !! puts them before a message
     procedure :: label          !! "&gear 'reducer'"
     procedure :: case_overrides !! number of the overrides that the load case gives
     procedure, private :: location_of_group, location_of_key
@@ -325,6 +326,14 @@ contains
 
     text = source_text(self, 0, 0)
   end function shown_case
+
+  !> Puts the path and the load case before a message that does not begin with the path.
+  subroutine name_case(self, error)
+    class(input_t), intent(in) :: self
+    type(error_t), intent(inout) :: error
+
+    if (index(error%message, self%shown_file()) /= 1) error%message = self%shown_case() // ': ' // error%message
+  end subroutine name_case
 
   !> "&gear 'reducer'", for messages.
   pure function label(self, index) result(text)

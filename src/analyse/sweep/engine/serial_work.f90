@@ -66,20 +66,20 @@ contains
   end subroutine write_code
 
   !> The numbers that results ask for of one analysis of the machine of an input.
-  subroutine find_reported(word, input, wanted, solved, values, error)
+  subroutine find_reported(word, input, wanted, response, values, error)
     character(len=*), intent(in) :: word                    !! of `analysis_words`
     type(input_t), intent(in) :: input
     type(analysis_result_t), intent(in) :: wanted(:)        !! those of other analyses are left out
-    class(analysis_t), allocatable, intent(inout) :: solved !! it, if it is solved; not allocated afterwards
+    class(analysis_t), allocatable, intent(inout) :: response   !! if it is solved; taken if the numbers are its
     real(wp), intent(inout) :: values(:)                    !! [results]
     type(error_t), allocatable, intent(out) :: error
     class(analysis_t), allocatable :: analysis
     type(machine_t) :: machine
     logical :: is_solved
 
-    is_solved = allocated(solved)
+    is_solved = word == 'response' .and. allocated(response)
     if (is_solved) then
-      call move_alloc(solved, analysis)
+      call move_alloc(response, analysis)
     else
       call new_analysis(word, analysis)
       call assemble_analysed(word, analysis, input, machine, error)
@@ -114,8 +114,7 @@ contains
     report%keeps_numbers = .true.
     if (any(wanted%mode == of_path)) call analysis%put_report(input, report)
     do i = 1, size(wanted)
-      if (.not. wanted(i)%is_reported()) cycle
-      if (wanted(i)%command /= word) cycle
+      if (.not. wanted(i)%is_reported_by(word)) cycle
       obstacle = ''
       if (wanted(i)%mode == of_path) then
         found = report%find(wanted(i)%path)

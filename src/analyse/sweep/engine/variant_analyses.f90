@@ -82,20 +82,11 @@ contains
     class(analysis_t), allocatable, intent(inout) :: response   !! if it is solved
     real(wp), intent(inout) :: values(:)   !! [results]
     type(error_t), allocatable, intent(out) :: error
-    class(analysis_t), allocatable :: none
-    integer :: i, k
+    integer :: k
 
     do k = 1, size(analysis_words)
-      do i = 1, size(wanted)
-        if (.not. wanted(i)%is_reported()) cycle
-        if (wanted(i)%command == analysis_words(k)) exit
-      end do
-      if (i > size(wanted)) cycle
-      if (analysis_words(k) == 'response') then
-        call find_reported('response', input, wanted, response, values, error)
-      else
-        call find_reported(trim(analysis_words(k)), input, wanted, none, values, error)
-      end if
+      if (.not. any(wanted%is_reported_by(trim(analysis_words(k))))) cycle
+      call find_reported(trim(analysis_words(k)), input, wanted, response, values, error)
       if (allocated(error)) return
     end do
   end subroutine find_numbers

@@ -54,17 +54,19 @@ module nocdyn_analysis_results
     integer :: in_unit = 0                          !! this unit as index of `units`, 0: SI
     character(len=:), allocatable :: long_name      !! a description
   contains
-    procedure :: is_reported, is_curve
+    procedure :: is_reported_by, is_curve
   end type analysis_result_t
 
 contains
 
   !> Whether the report of an analysis has the number.
-  elemental logical function is_reported(self)
+  elemental logical function is_reported_by(self, word)
     class(analysis_result_t), intent(in) :: self
+    character(len=*), intent(in) :: word   !! the analysis
 
-    is_reported = self%mode < 0
-  end function is_reported
+    is_reported_by = self%mode < 0
+    if (is_reported_by) is_reported_by = self%command == word
+  end function is_reported_by
 
   !> Whether it is a point of a curve.
   elemental logical function is_curve(self)

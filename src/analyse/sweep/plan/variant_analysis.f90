@@ -55,10 +55,7 @@ contains
       if (allocated(error)) return
     end if
     if (any(results%mode == 0)) then
-      is_of_report = .false.
-      do i = 1, size(results)
-        if (present(solved) .and. results(i)%is_reported()) is_of_report = is_of_report .or. results(i)%command == 'response'
-      end do
+      is_of_report = present(solved) .and. any(results%is_reported_by('response'))
       call find_response(input, is_of_report, response, error)
       if (allocated(error)) return
       if (is_of_report) allocate (solved, source=response)
