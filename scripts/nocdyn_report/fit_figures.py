@@ -3,10 +3,8 @@
 import argparse
 import textwrap
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
-import f90nml
 import numpy as np
 from matplotlib import pyplot
 from matplotlib.figure import Figure
@@ -19,7 +17,7 @@ from .speed_results import rpm
 from .style import COLOURS, PIXELS, WIDTH, add_format_option, add_title, plain, save, saved
 from .thinning import thin
 
-REPORT, FITTED = "fit.json", "fitted.nml"
+REPORT = "fit.json"
 BEFORE = {"color": COLOURS[1], "linewidth": 0.9}
 CONFIDENT = 1.959963984540054  # standard errors on either side of 95 % of a normal distribution
 MOST_NUMBERS = 12  # unknowns whose correlations have room as numbers
@@ -136,23 +134,14 @@ def draw_all(folder: Path) -> dict[str, Figure]:
     report = read_json(folder / REPORT, ("unknowns", "measurements"))
     title = with_case(report["title"] or Path(report["input"]).name, case_of(folder, "fit"))
     figures = {}
-    body = _response_body(folder / FITTED)
     for one in read_comparisons(folder, REPORT):
         is_curve = one.kind != FREQUENCY and len(one.measured) > 1
         draw = draw_measurement if is_curve else draw_values
-        figures[one.facts["file"].removesuffix(".csv")] = draw(replace(one, body=body), title)
+        figures[one.facts["file"].removesuffix(".csv")] = draw(one, title)
     figures["fit_unknowns"] = draw_unknowns(report["unknowns"], title)
     if len(report["unknowns"]) > 1:
         figures["fit_correlations"] = draw_correlations(report["unknowns"], title)
     return figures
-
-
-def _response_body(file: Path) -> str:
-    """Whose speed that of orders is; '' if it is not known."""
-    try:
-        return f90nml.read(file).get("response", {}).get("body", "")
-    except OSError:
-        return ""
 
 
 def main() -> None:

@@ -234,6 +234,11 @@ contains
 
     call open_analysis_report(json, input)
     call json%put('notes', self%notes)
+    if (size(input%groups_named('response')) > 0) then
+      associate (response => input%groups(input%position('response')))
+        if (response%has_value('body')) call json%put('body', response%text('body'))   ! whose speed that of orders is
+      end associate
+    end if
     call json%put('values', size(self%solution%residuals))
     call json%put('evaluations', self%evaluations)
     call json%put('has_converged', self%solution%has_converged)
